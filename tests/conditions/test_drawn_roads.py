@@ -79,16 +79,6 @@ def test_a_camera_that_is_described_has_metres() -> None:
     assert found(described) == []
 
 
-@pytest.mark.parametrize("code", ["lane-geometry", "small-frames"])
-def test_each_of_them_can_be_ignored(code: Code) -> None:
-    lanes = load_settings((), ["lanes.enabled=true"])
-    ignoring = lanes.model_copy(update={"conditions": ConditionSettings(ignore=(code,))})
-    every = found(lanes, width=300)
-    assert every == ["lane-geometry", "small-frames"]
-    rest = [item for item in every if item != code]
-    assert found(ignoring, width=300) == rest
-
-
 def test_a_plane_is_the_same_from_a_decoder_and_from_an_image() -> None:
     image = np.random.default_rng(1).integers(40, 200, (90, 160, 3), np.uint8)
     image = np.repeat(np.repeat(image, 4, axis=0), 4, axis=1)

@@ -53,10 +53,6 @@ class Files:
     """A bend, distorted by the lens, and a red car that stays in one place of the frame."""
     picture: Path
     """Its first frame."""
-    plain: Path
-    """The road without lens or car."""
-    bare: Path
-    """A grey picture."""
     camera: Path
     settings: Path
     model: Path
@@ -85,14 +81,12 @@ def road() -> Scene:
 @pytest.fixture(scope="module")
 def files(road: Scene, undistorter: Undistorter, tmp_path_factory: pytest.TempPathFactory) -> Files:
     folder = tmp_path_factory.mktemp("lanes")
-    names = ("clip.mp4", "frame.png", "plain.png", "bare.png", "camera.yaml", "my.yaml", "red.npz")
+    names = ("clip.mp4", "frame.png", "camera.yaml", "my.yaml", "red.npz")
     made = Files(*(folder / name for name in names))
     renderer = Renderer(road)
     seen = [with_car(distorted(renderer.image(i), undistorter)) for i in range(COUNT)]
     write_video(made.clip, seen)
     write_image(made.picture, seen[0])
-    write_image(made.plain, renderer.image(0))
-    write_image(made.bare, np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
     save_camera(LENS, made.camera)
     settings = red_settings(settings_for(road.camera))
     values = settings.model_dump(mode="json")
@@ -217,22 +211,6 @@ def test_the_lane_and_the_boxes_of_a_picture_are_reported_and_drawn(
     drawn = read_image(out)
     assert has_outline(drawn, reported, color_of(1))
     assert (drawn[CORNER] == read_image(files.picture)[CORNER]).all()
-
-
-def test_without_a_camera_the_lane_has_no_metres_and_one_warning_says_so(
-    run: Run, files: Files, tmp_path: Path
-) -> None:
-    pictures, out = (files.plain, files.bare), tmp_path / "out"
-    options = ("-o", out, "--json", "-", *files.red, "--lanes")
-    result = run("detect-image", *pictures, *options, code=0)
-    plain, bare = json.loads(result.out)
-    assert [plain["lane"].pop(key) for key in ("radius", "offset", "width")] == [None] * 3
-    assert set(plain["lane"]) == {"left", "right"}
-    assert plain["boxes"] == []
-    assert bare["lane"] is None
-    assert "warning" not in result.err
-    assert result.err.count("note: lanes: no values in metres without camera.lens\n") == 1
-    assert (read_image(out / "bare.png") == read_image(files.bare)).all()
 
 
 def test_without_a_camera_no_output_of_a_video_has_metres(

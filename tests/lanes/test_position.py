@@ -74,11 +74,6 @@ def test_a_point_on_a_known_road_gets_its_metres_and_its_lane(
         assert position.lane == (round(fraction) if abs(fraction) < 3.5 else None)
 
 
-@pytest.mark.parametrize("row", [-1e6, CAMERA.horizon - 30, CAMERA.horizon, np.nan])
-def test_nothing_stands_above_the_horizon_or_nowhere(row: float) -> None:
-    assert place((640, row)) is None
-
-
 def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known() -> None:
     small = PinholeCamera.dashboard(160, 90)
     view = TopView(lane_view(small, near=6, far=FAR), small.width, small.height)

@@ -224,11 +224,6 @@ class TestFindings:
         assert "Findings" in made.text
         assert "Findings" not in seen(page()).text
 
-    def test_its_times_are_a_row_above_the_vehicles(self) -> None:
-        plain, marked = (replace(page(), findings=found) for found in ((), (self.FINDING,)))
-        assert marked.html().count("it &lt;was&gt; dark") == 2, "in the list and in the row"
-        assert "it &lt;was&gt; dark" not in plain.html()
-
     def test_vehicles_that_stood_are_counted_apart(self) -> None:
         stood = [replace(record, motion="standing") for record in TWO]
         made = replace(page(), records=[replace(TWO[0], motion="drove"), *stood[1:]])

@@ -249,10 +249,6 @@ class TestZone:
     def test_of_names_and_tables_is_a_setting(self, name: str, zone: str, text: str) -> None:
         assert str(clock_of(name, zone=zone)) == f"{text} (from its name)"
 
-    def test_a_given_time_is_shown_in_the_zone_of_the_camera(self) -> None:
-        found = clock_of("a.mp4", "2026-05-01 07:00-03:00", zone=BERLIN)
-        assert str(found) == "2026-05-01 12:00:00+02:00 (as given)"
-
     @pytest.mark.parametrize("zone", [None, BERLIN])
     def test_each_moment_has_the_offset_of_that_moment(self, zone: str | None) -> None:
         if zone is None:  # that of this computer

@@ -68,13 +68,6 @@ def test_a_zone_is_a_place_that_is_visited() -> None:
     assert (alone.origin, alone.destination) == ("zone", None), "leaving it is no second visit"
 
 
-def test_two_tracks_that_were_taken_for_one_vehicle_have_one_flow_and_class() -> None:
-    old = named(frames(through((0, 100, 400), (3.9, 490, 400)), seconds=4), "car")
-    new = numbered(frames(through((4.1, 510, 400), (10, 1100, 400))), 2)
-    (row,) = counts(joined(old, named(new, "truck")), WEST, EAST).flows()
-    assert (row.origin, row.destination, row.class_name) == ("west", "east", "truck")
-
-
 def test_intervals_begin_at_round_times_of_the_clock_and_of_the_video_without_one() -> None:
     counted = crossing(EAST)
     rows = counted.flows(5)
@@ -110,16 +103,6 @@ def test_counts_are_a_table_of_pandas(
         patch.setattr(Counts, "table", lambda *_: map(astuple, count_table([found], 5)))
         table: Any = found.to_pandas(5)
     assert table == [asdict(row) for row in found.table(5)]
-
-
-def test_zones_have_entries_exits_and_occupancy_by_interval() -> None:
-    stays = through((0, 100, 400), (4, 500, 400), (10, 520, 400))
-    rows = counts(frames(GOES_EAST, stays), ZONE).zone_use(5)
-    assert [(row.start, row.entered, row.left, row.max) for row in rows] == [
-        (0, 2, 0, 2), (5, 0, 1, 2), (10, 0, 1, 1),
-    ]  # fmt: skip
-    assert [row.mean for row in rows] == pytest.approx([4 / 5, (2 * 2 + 3) / 5, 1], abs=0.02)
-    assert rows[1].mean_stay == rows[1].max_stay == pytest.approx(4, abs=0.02)
 
 
 class TestSeveralVideos:
