@@ -68,6 +68,14 @@ def test_a_zone_is_a_place_that_is_visited() -> None:
     assert (alone.origin, alone.destination) == ("zone", None), "leaving it is no second visit"
 
 
+def test_a_line_and_a_zone_can_be_left_out_of_flows() -> None:
+    line = EAST.model_copy(update={"flows": False})
+    zone = ZONE.model_copy(update={"flows": False})
+    found = counts(frames(GOES_EAST), WEST, line, zone)
+    assert [(row.origin, row.destination) for row in found.flows()] == [("west", None)]
+    assert [total.count for total in found.totals] == [1, 0, 1, 0, 1, 1, 0, 0]
+
+
 def test_intervals_begin_at_round_times_of_the_clock_and_of_the_video_without_one() -> None:
     counted = crossing(EAST)
     rows = counted.flows(5)
@@ -184,6 +192,7 @@ class TestFiles:
         assert rows_of(tmp_path / "f.csv")[-1] == {
             "start": "2026-05-01 07:00:00.000+02:00", "end": "2026-05-01 07:15:00.000+02:00",
             "from": "west", "to": "'=south", "class": "vehicle", "count": "1",
+            "observed": "10.0", "part": "True", "per_hour": "360.0",
         }  # fmt: skip
         self.write(flows_content, tmp_path / "g.csv", {"v": crossing(EAST)})
         assert [row["to"] for row in rows_of(tmp_path / "g.csv")] == ["(none)"]
@@ -197,32 +206,29 @@ class TestFiles:
             "'=south,0,0,0,0\n"
         )  # fmt: skip
 
-    def test_the_wide_table_has_a_row_for_each_interval_and_sums(self, tmp_path: Path) -> None:
+    def test_the_wide_table_has_a_column_for_each_class_of_the_settings(
+        self, tmp_path: Path
+    ) -> None:
         cars = named(frames(GOES_EAST), "car")
-        truck = named(numbered(frames(TURNS_BACK), 2), "truck")
-        counted = {"v": counts(joined(cars, truck), WEST)}
+        truck = named(numbered(frames(TURNS_BACK), 2), "all")  # which is not a sum
+        counted = {"v": replace(counts(joined(cars, truck), WEST), classes=("car", "bus"))}
         self.write(flows_content, tmp_path / "f.wide.csv", counted, 5)
         assert (tmp_path / "f.wide.csv").read_text() == (
-            'start,end,"west to west, car","west to west, truck","west to west, all",'
-            '"west to (none), car","west to (none), truck","west to (none), all",all\n'
-            "0.0,5.0,0,1,1,1,0,1,2\n"
-            "5.0,10.0,0,0,0,0,0,0,0\n"
-            "10.0,15.0,0,0,0,0,0,0,0\n"
-            "all,,0,1,1,1,0,1,2\n"
+            'start,end,"west to west, car","west to west, bus","west to west, all",'
+            '"west to west, all","west to (none), car","west to (none), bus","west to (none), all",'
+            '"west to (none), all",all\n'
+            "0.0,5.0,0,0,1,1,1,0,0,1,2\n"
+            "5.0,10.0,0,0,0,0,0,0,0,0,0\n"
+            "10.0,15.0,0,0,0,0,0,0,0,0,0\n"
+            "all,,0,0,1,1,1,0,0,1,2\n"
         )
         self.write(counts_content, tmp_path / "c.wide.csv", counted)
         assert (tmp_path / "c.wide.csv").read_text() == (
-            'start,end,"west: left, car","west: left, truck","west: left, all",'
-            '"west: right, car","west: right, truck","west: right, all"\n'
-            "0.0,10.0,1,1,2,0,1,1\n"
-            "all,,1,1,2,0,1,1\n"
+            'start,end,"west: left, car","west: left, bus","west: left, all","west: left, all",'
+            '"west: right, car","west: right, bus","west: right, all","west: right, all"\n'
+            "0.0,10.0,1,0,1,2,0,0,1,1\n"
+            "all,,1,0,1,2,0,0,1,1\n"
         )
-
-    def test_a_class_that_is_called_all_is_not_a_sum(self, tmp_path: Path) -> None:
-        counted = {"v": counts(named(frames(GOES_EAST), "all"), WEST)}
-        self.write(counts_content, tmp_path / "c.wide.csv", counted)
-        *_, sums = (tmp_path / "c.wide.csv").read_text().splitlines()
-        assert sums == "all,,1,1,0,0"
 
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:
         self.write(flows_content, tmp_path / "f.json", {"v": at(crossing(EAST))})
@@ -234,6 +240,7 @@ class TestFiles:
                     "start": "2026-05-01 07:04:57.000+02:00",
                     "end": "2026-05-01 07:05:07.000+02:00",
                     "from": "east", "to": None, "class": "vehicle", "count": 1,
+                    "observed": 10.0, "part": False, "per_hour": 360.0,
                 },
             ],
             "matrix": {"east": {"east": 0, "(none)": 1}},
@@ -245,13 +252,15 @@ class TestFiles:
         counted = {"v": counts(frames(GOES_EAST), WEST, ZONE)}
         self.write(counts_content, tmp_path / "c.totals.csv", counted, 5)
         rows = rows_of(tmp_path / "c.totals.csv")
-        assert list(rows[0]) == ["start", "end", "name", "direction", "class", "count"]
+        names = "start end name direction class count observed part per_hour"
+        assert list(rows[0]) == names.split()
         assert sum(int(row["count"]) for row in rows) == 3
         self.write(counts_content, tmp_path / "c.zones.csv", counted, 5)
         row, *_ = rows_of(tmp_path / "c.zones.csv")
         assert row == {
             "start": "0.0", "end": "5.0", "name": "zone", "entered": "1", "left": "0",
             "mean": "0.4", "max": "1", "mean_stay": "", "max_stay": "",
+            "observed": "5.0", "part": "False",
         }  # fmt: skip
 
     def test_events_have_clock_times(self, tmp_path: Path) -> None:

@@ -108,8 +108,8 @@ def _read_layer(path: Path) -> Document:
     """Read a file as a layer, with paths relative to the working folder."""
     layer = _with_sizes(document.read_document(path))
     regions = [region for kind, region in shapes_in(layer.values) if kind is RegionSettings]
-    for section in (layer.values.get("detector"), *regions):
-        for key in ("model", "mask"):
+    for section in (layer.values.get("detector"), layer.values.get("survey"), *regions):
+        for key in ("model", "mask", "picture"):
             if isinstance(section, dict) and isinstance(section.get(key), str):
                 section[key] = str(path.parent / section[key])
     return layer

@@ -66,6 +66,20 @@ Code = Literal[
 """What makes a result doubtful; docs/conditions.md explains each."""
 
 
+class SurveySettings(Section):
+    """What the workbook of counts says of the survey."""
+
+    site: str | None = Field(None, max_length=200)
+    """Name of the place."""
+    surveyor: str | None = Field(None, max_length=200)
+    """Who is responsible."""
+    weather: str | None = Field(None, max_length=200)
+    """Weather and road conditions."""
+    picture: str | None = Field(None, min_length=1, max_length=4096)
+    """Image of the scene, with the aspect ratio of the frames. null: a frame, if a video is read.
+    """
+
+
 class ConditionSettings(Section):
     """Reasons to doubt a result: the findings about a video."""
 
@@ -211,6 +225,7 @@ class Settings(Section):
     steps: tuple[str, ...] = ()
     """Names of steps of other packages to run between the tracker and the outputs, in order."""
     traffic: TrafficSettings = TrafficSettings()
+    survey: SurveySettings = SurveySettings()
     lanes: LaneSettings = LaneSettings()
     conditions: ConditionSettings = ConditionSettings()
     train: TrainSettings = TrainSettings()
@@ -234,14 +249,17 @@ class Settings(Section):
         return classes
 
     def with_paths(self, change: Callable[[str], str]) -> "Settings":
-        """Return the settings with the paths of the model file and of masks changed."""
+        """Return the settings with the paths of the model file, masks and picture changed."""
         regions = tuple(
             region.model_copy(update={"mask": change(region.mask)}) if region.mask else region
             for region in self.regions
         )
         model = self.detector.model
         detector = self.detector.model_copy(update={"model": change(model) if model else None})
-        return self.model_copy(update={"regions": regions, "detector": detector})
+        picture = self.survey.picture
+        survey = self.survey.model_copy(update={"picture": change(picture) if picture else None})
+        update = {"regions": regions, "detector": detector, "survey": survey}
+        return self.model_copy(update=update)
 
     @property
     def lack_of_metres(self) -> str | None:

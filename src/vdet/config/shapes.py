@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from vdet.config.classes import our_name
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 from vdet.polygons import Point
@@ -23,6 +24,7 @@ Side = Annotated[int, Field(ge=16, le=100_000)]
 Size = tuple[Side, Side]
 """Width and height of frames, in pixels."""
 Name = Annotated[str, Field(min_length=1, max_length=80)]
+Approach = Literal["N", "NE", "E", "SE", "S", "SW", "W", "NW"]
 
 FRACTIONS = 1, 1
 """The size of points that are fractions of the frame."""
@@ -155,6 +157,12 @@ class LineSettings(Shape):
     """Name of the direction to the left, seen from the start."""
     right: Name = "right"
     """Name of the direction to the right."""
+    approach: Approach | None = None
+    """Arm of a junction that it lies across: N, NE, E, SE, S, SW, W or NW. Flows between the lines
+    of arms are turning movements.
+    """
+    flows: bool = True
+    """Whether flows begin and end at it."""
 
     @model_validator(mode="after")
     def _has_two_directions(self) -> "LineSettings":
@@ -170,6 +178,8 @@ class ZoneSettings(Shape):
     """Unique name."""
     points: Polygon
     """Corners in order, x and y. The last corner is joined to the first."""
+    flows: bool = True
+    """Whether flows begin and end in it."""
 
 
 _INTERVAL = re.compile("[1-9][0-9]{0,4} ?(s|min|h)", re.ASCII)
@@ -199,6 +209,13 @@ class TrafficSettings(Section):
     """Draw the lines and zones with their current counts into the video."""
     min_seen_seconds: float = Field(0.2, ge=0, le=10)
     """Minimum seconds of detections for a vehicle to count."""
+    pcu: Annotated[
+        dict[Name, Annotated[float, Field(ge=0, le=100)]],
+        AfterValidator(lambda table: {our_name(name) or name: pcu for name, pcu in table.items()}),
+    ] = Field({}, max_length=100)
+    """Passenger car units of each class, such as {truck: 2, bus: 2}; other classes have 1. {}: none
+    in workbooks.
+    """
 
     def __bool__(self) -> bool:
         return bool(self.lines or self.zones)

@@ -11,7 +11,7 @@ _DATA_SUFFIXES = IMAGE_SUFFIXES | {".csv", ".json", ".txt", ".yaml", ".yml"}
 
 
 def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
-    """Identify the files at `paths`, and the model file and masks of the settings.
+    """Identify the files at `paths`, and the model file, masks and picture of the settings.
 
     A folder stands for the images and labels in it, recursively, and a pattern such as
     `img_%04d.png` for its images. Raises `VideoError` if there is none of these, `ImageError` or
@@ -25,6 +25,7 @@ def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
             files += numbered_images(path) or [path]
     if settings:
         check_masks(settings.regions)
-        named = [settings.detector.model, *(region.mask for region in settings.regions)]
+        masks = (region.mask for region in settings.regions)
+        named = [settings.detector.model, settings.survey.picture, *masks]
         files += map(Path, filter(None, named))
     return file_ids(files)

@@ -198,6 +198,8 @@ def extend(spans: list[Span], time: float, gap: float | None) -> None:
 
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_JOINED = 2.0
+"""Maximum seconds from the last frame of a video to the first of the next one, without a gap."""
 _MAX_COUNT = 200_000
 """Maximum number of intervals: two days of seconds."""
 
@@ -214,6 +216,10 @@ class Interval:
         Its limits, as they are shown.
     first, last
         Its part between the first and the last frame of all videos, seconds of `Intervals`.
+    observed
+        Seconds of it with video; once, where several videos have the same times.
+    is_part
+        Whether there is no video in more than a second of it.
     """
 
     number: int
@@ -221,6 +227,8 @@ class Interval:
     end: ClockTime
     first: float
     last: float
+    observed: float
+    is_part: bool
 
 
 class Intervals:
@@ -275,6 +283,12 @@ class Intervals:
             for zero, (_, spans) in zip(self._zeros, videos, strict=True)
         ]
         self._every = [span for spans in self._spans for span in spans]
+        self._observed: list[Span] = []
+        for first, last in sorted(self._every):
+            if self._observed and first - self._observed[-1][1] <= _JOINED:
+                begin, end = self._observed.pop()
+                first, last = begin, max(end, last)  # noqa: PLW2901
+            self._observed.append((first, last))
         self._first = min(first for first, _ in self._every)
         self._last = max(last for _, last in self._every)
         if length and sum((last - first) // length + 1 for first, last in self._every) > _MAX_COUNT:
@@ -340,18 +354,21 @@ class Intervals:
 
     def covered(self, period: Interval) -> float:
         """Return the seconds of video in an interval."""
-        return sum(max(0.0, min(period.last, b) - max(period.first, a)) for a, b in self._every)
+        return _common(self._every, period.first, period.last)
 
     def _interval(self, number: int) -> Interval:
         start, end = self._first, self._last
         if self._length is not None:
             start, end = float(number), float(self._end(number))
+        observed = _common(self._observed, start, end)
         return Interval(
             number=number,
             start=self._clock_time(start),
             end=self._clock_time(end),
             first=max(start, self._first),
             last=min(end, self._last),
+            observed=round(observed, 3),
+            is_part=observed < end - start - 1,
         )
 
     def _clock_time(self, seconds: float) -> ClockTime:
@@ -359,3 +376,8 @@ class Intervals:
             time = _EPOCH + timedelta(milliseconds=round(1000 * seconds))
             return time.astimezone(self._zone)
         return round(seconds, 3) if self._is_timed else None
+
+
+def _common(spans: Sequence[Span], start: float, end: float) -> float:
+    """Return how many seconds of spans are between two moments."""
+    return sum(max(0.0, min(end, last) - max(start, first)) for first, last in spans)

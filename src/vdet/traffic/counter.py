@@ -113,6 +113,12 @@ class VehicleCounter:
             zones=tuple(zone.name for zone in self.zones),
             spans=tuple(self.spans) or ((0.0, 0.0),),
             warnings=tuple(warnings),
+            outside_flows=tuple(
+                shape.name
+                for shape in (*self._settings.traffic.lines, *self._settings.traffic.zones)
+                if not shape.flows
+            ),
+            classes=self._settings.classes or self._settings.detector.vehicle_classes,
         )
 
     def so_far(self) -> Counter[Direction]:

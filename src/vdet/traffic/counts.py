@@ -85,7 +85,14 @@ class DirectionTotal:
 class CountRow:
     """Number of vehicles of a class in a direction of a line or zone, in an interval.
 
-    The class is `UNKNOWN` if the detector has no classes, as in `FlowRow`.
+    Attributes
+    ----------
+    class_name
+        `UNKNOWN` if the detector has no classes, as in `FlowRow`.
+    observed, is_part
+        As in `Interval`.
+    per_hour
+        Vehicles in an hour of video; None if the interval has only one frame.
     """
 
     start: ClockTime
@@ -94,6 +101,9 @@ class CountRow:
     direction: str
     class_name: str
     count: int
+    observed: float
+    is_part: bool
+    per_hour: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +111,7 @@ class FlowRow:
     """Number of vehicles of a class from one line or zone to another, in an interval.
 
     The interval is that of the first event. `destination` is None for vehicles with one event only.
+    Other values are as in `CountRow`.
     """
 
     start: ClockTime
@@ -109,6 +120,9 @@ class FlowRow:
     destination: str | None
     class_name: str
     count: int
+    observed: float
+    is_part: bool
+    per_hour: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +137,8 @@ class ZoneRow:
         Mean and maximum number of vehicles inside, over the video in the interval.
     mean_stay, max_stay
         Of the vehicles that left or vanished, seconds; None if none did.
+    observed, is_part
+        As in `Interval`.
     """
 
     start: ClockTime
@@ -134,6 +150,8 @@ class ZoneRow:
     max: int
     mean_stay: float | None
     max_stay: float | None
+    observed: float
+    is_part: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +185,10 @@ class Counts:
         A sentence for each reason to doubt the tracks.
     corrected
         What a reviewer corrected; None if nothing was.
+    outside_flows
+        The names of the lines and zones at which flows neither begin nor end.
+    classes
+        The classes of vehicles that can be counted; those of tracks may be others.
     """
 
     events: tuple[Event, ...]
@@ -177,6 +199,14 @@ class Counts:
     warnings: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     corrected: Corrected | None = None
+    outside_flows: tuple[str, ...] = ()
+    classes: tuple[str, ...] = ()
+
+    @property
+    def flow_names(self) -> tuple[str, ...]:
+        """The lines and zones at which flows begin and end."""
+        names = dict.fromkeys(name for name, _ in self.directions)
+        return tuple(name for name in names if name not in self.outside_flows)
 
     @property
     def totals(self) -> tuple[DirectionTotal, ...]:
@@ -242,7 +272,7 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
         for event in video.events
     )
     return [
-        CountRow(period.start, period.end, name, direction, kind, count)
+        CountRow(period.start, period.end, name, direction, kind, count, *_flow(period, count))
         for period, (name, direction), kind, count in _cells(intervals, counts, _directions(videos))
     ]
 
@@ -258,12 +288,40 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     for index, first, last in vehicle_flows(videos):
         flow = first.name, last.name if last else None
         counts[intervals.number(index, first.time), flow, class_of(first)] += 1
-    names: list[str | None] = [*dict.fromkeys(name for name, _ in _directions(videos)), None]
+    names: list[str | None] = [*flow_names(videos), None]
     flows = sorted({flow for _, flow, _ in counts}, key=lambda flow: list(map(names.index, flow)))
     return [
-        FlowRow(period.start, period.end, origin, destination, kind, count)
+        FlowRow(period.start, period.end, origin, destination, kind, count, *_flow(period, count))
         for period, (origin, destination), kind, count in _cells(intervals, counts, flows)
     ]
+
+
+def _flow(period: Interval, count: int) -> tuple[float, bool, float | None]:
+    """Return the last values of a row: `observed`, `is_part` and `per_hour`."""
+    return period.observed, period.is_part, per_hour(count, period.observed)
+
+
+def per_hour(count: float, seconds: float) -> float | None:
+    """Return the number of vehicles per hour of video; None without video."""
+    return round(3600 * count / seconds, 1) if seconds else None
+
+
+def flow_names(videos: Sequence[Counts]) -> list[str]:
+    """Return the lines and zones at which flows begin and end."""
+    return list(dict.fromkeys(name for video in videos for name in video.flow_names))
+
+
+def class_columns(videos: Sequence[Counts]) -> list[str]:
+    """Return the classes in the columns of a table: equal for all videos of one camera.
+
+    They are those of the settings, then all others that were counted. `UNKNOWN` stands for all
+    vehicles of a detector without classes.
+    """
+    counted = {event.class_name for video in videos for event in video.events}
+    if counted <= {None} and counted:
+        return [UNKNOWN]
+    listed = (name for video in videos for name in video.classes)
+    return list(dict.fromkeys((*listed, *sorted(filter(None, counted))))) or [UNKNOWN]
 
 
 def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event | None]]:
@@ -273,8 +331,10 @@ def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event 
     """
     trips: dict[int, list[tuple[int, Event]]] = {}
     for index, video in enumerate(videos):
+        names = set(video.flow_names)
         for event in video.events:
-            if event.name not in video.zones or event.direction in _IN:
+            is_visit = event.name not in video.zones or event.direction in _IN
+            if is_visit and event.name in names:
                 trips.setdefault(event.vehicle, []).append((index, event))
     for (index, first), *later in trips.values():
         yield index, first, later[-1][1] if later else None
@@ -332,6 +392,8 @@ def _zone_row(
         max=max(levels),
         mean_stay=round(sum(stays) / len(stays), 3) if stays else None,
         max_stay=max(stays, default=None),
+        observed=period.observed,
+        is_part=period.is_part,
     )
 
 

@@ -15,7 +15,9 @@ from vdet.traffic import counts as tables
 from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow
 from vdet.traffic.tables import VIDEO, is_json, plain_time
 
-_HEADINGS = {"class_name": "class", "origin": "from", "destination": "to"}
+_HEADINGS = {
+    "class_name": "class", "origin": "from", "destination": "to", "is_part": "part"
+}  # fmt: skip
 
 
 def _columns(row: type[Any]) -> tuple[str, ...]:
@@ -58,7 +60,8 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
     if _is_table(path, ".totals"):
         return [_TOTALS, *map(_cells, tables.count_table(every, interval))]
     if _is_table(path, ".wide"):
-        return wide_table(tables.count_table(every, interval), ": ", has_total=False)
+        rows = tables.count_table(every, interval)
+        return wide_table(rows, tables.class_columns(every), ": ", has_total=False)
     if _is_table(path, ".zones"):
         return [_ZONES, *map(_cells, tables.zone_table(every, interval))]
     events = {name: [_event(video, e) for e in video.events] for name, video in videos.items()}
@@ -78,7 +81,7 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
         content = {"flows": _items(_FLOWS, rows), "matrix": matrix}
         return _json(videos, interval, content, events=False)
     if _is_table(path, ".wide"):
-        return wide_table(rows, " to ", has_total=True)
+        return wide_table(rows, tables.class_columns(every), " to ", has_total=True)
     if _is_table(path, ".matrix"):
         body = ((origin, *row.values()) for origin, row in matrix.items())
         return [("from", *matrix, NOWHERE), *body]
@@ -86,7 +89,7 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
 
 
 def wide_table(
-    rows: Sequence[CountRow | FlowRow], between: str, *, has_total: bool
+    rows: Sequence[CountRow | FlowRow], classes: Sequence[str], between: str, *, has_total: bool
 ) -> list[Sequence[Any]]:
     """Return a table with a row for each interval, a column for each pair and class, and sums.
 
@@ -94,13 +97,12 @@ def wide_table(
     sum of all pairs.
     """
     sums: Counter[tuple[Any, ...]] = Counter()
-    cells = [_cells(row) for row in rows]
+    cells = [_cells(row)[:6] for row in rows]
     for start, end, *pair, name, count in cells:
         for interval in ((start, end), (ALL, "")):
             for column in ((*pair, name), (*pair, None), ()):  # a class may be called all
                 sums[*interval, *column] += count
     intervals = dict.fromkeys(tuple(row[:2]) for row in cells)
-    classes = dict.fromkeys(row[4] for row in cells)
     pairs = dict.fromkeys(tuple(row[2:4]) for row in cells)
     columns = [(*pair, name) for pair in pairs for name in (*classes, None)]
     heading = [f"{between.join(pair)}, {name or ALL}" for *pair, name in columns]
@@ -118,7 +120,7 @@ def flow_matrix(videos: Sequence[Counts]) -> dict[str, dict[str, int]]:
         (first.name, last.name if last else NOWHERE)
         for _, first, last in tables.vehicle_flows(videos)
     )
-    names = dict.fromkeys(name for video in videos for name, _ in video.directions)
+    names = tables.flow_names(videos)
     return {origin: {end: flows[origin, end] for end in (*names, NOWHERE)} for origin in names}
 
 
