@@ -232,8 +232,9 @@ detector: {{model: mine.onnx}}
 regions: [{{name: ramp, mask: ramp.png}}]
 traffic:
   interval: 15min
-  lines: [{{name: "{NAME}", start: [100, 200], end: [500, 200], left: "\\x7f\\x85\\u2028"}}]
-  zones: [{{name: closed, points: [[50, 50], [150, 50], [100, 150], [50, 50]]}}]
+  lines:
+    - {{name: "{NAME}", start: [100, 200], end: [500, 200], left: "\\x7f\\x85\\u2028", approach: N}}
+  zones: [{{name: closed, flows: false, points: [[50, 50], [150, 50], [100, 150], [50, 50]]}}]
 """
     )
     values = given_values([str(given)])
@@ -253,6 +254,7 @@ traffic:
         assert found["traffic"] == {"interval": "15min"}
         assert (line["name"], line["start"], line["left"]) == (NAME, [200, 400], "\x7f\x85\u2028")
         assert zone["points"] == [[100, 100], [300, 100], [200, 300]]
+        assert (line["approach"], zone["flows"]) == ("N", False)
         assert window.run("return get('save').disabled") is False
         (saved := tmp_path / "saved.yaml").write_text(text)
         window.choose_file("#open", saved)

@@ -59,7 +59,8 @@ function placeLine(line, size) {
   const reach = [atEdge(start) ? [start[0] - dx, start[1] - dy] : start, atEdge(end) ? [ax + dx, ay + dy] : end];
   const distance = (x, y) => (wx * (y - ay) - wy * (x - ax)) / length;
   return {
-    isZone: false, name: line.name, directions: [line.left, line.right], start, end, length, size, edge: edgeOf([start, end]),
+    isZone: false, name: line.name, hasFlows: line.flows !== false,
+    directions: [line.left, line.right], start, end, length, size, edge: edgeOf([start, end]),
     isPositive: (x, y) => distance(x, y) >= 0,
     away: (x, y) => Math.abs(distance(x, y)),
     cuts: ([left, top, right, bottom]) => Math.abs(distance((left + right) / 2, (top + bottom) / 2)) <=
@@ -81,7 +82,8 @@ function placeZone(zone, size) {
   const [right, bottom] = size.map(side => side - INSIDE), sides = segments.map(edgeOf);
   const inFrame = ([x, y]) => [clamp(x, INSIDE, right), clamp(y, INSIDE, bottom)];
   return {
-    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size,
+    isZone: true, name: zone.name, hasFlows: zone.flows !== false,
+    directions: ["enter", "exit", "appear", "vanish"], corners, size,
     ...polygonOf(corners, INSIDE, right, bottom),
     away: (x, y) => sides.reduce((least, side) =>
       Math.min(least, distanceTo(side, clamp(x, INSIDE, right), clamp(y, INSIDE, bottom))), Infinity),
@@ -243,7 +245,7 @@ function quantile(values, fraction) {
 /** Return how many vehicles go from one place to another, by "from\nto"; to nothing for a single place. */
 function flowsOf(found) {
   const trips = new Map(), flows = {};
-  for (const { border: { name }, visits } of found)
+  for (const { border: { name }, visits } of found.filter(({ border }) => border.hasFlows))
     for (const [path, some] of visits)
       for (const { direction, time, row } of some)
         if (direction !== "exit" && direction !== "vanish")
@@ -325,7 +327,7 @@ function levelGround(pixels, lengths, size) {
 const MARK = "# Drawn with vdet draw";
 const FORMS = { // the lists of the file, and what their items have
   ground: ["pixel", "metres"], regions: ["name", "kind", "points", "mask"],
-  lines: ["name", "start", "end", "left", "right"], zones: ["name", "points"],
+  lines: ["name", "start", "end", "left", "right", "approach", "flows"], zones: ["name", "points", "flows"],
 };
 
 /** Escape the characters that YAML takes for line breaks, or does not allow, although JSON has them. */
@@ -365,7 +367,7 @@ function writeYaml(places, size, rest, name) {
 function readYaml(text) {
   if (!text.startsWith(MARK)) throw Error("not written by this page; open it with vdet draw CLIP -c FILE");
   const places = { ground: [], regions: [], lines: [], zones: [] }, rest = { camera: [], traffic: [], other: [] };
-  const quoted = part => part.startsWith('"') ? part : JSON.stringify(part); // items are JSON, but for plain words
+  const quoted = part => /^("|true$|false$)/.test(part) ? part : JSON.stringify(part); // items are JSON, but for plain words
   const readItem = item => JSON.parse(item.replace(/"(?:\\.|[^"\\])*"|[A-Za-z_]\w*/g, quoted));
   let section = "other", list = null, size = null;
   for (const line of text.split("\n").filter(line => line.trim() && !line.startsWith("#"))) {
@@ -690,7 +692,7 @@ async function openPage(data) {
     get("warnings").replaceChildren(...[...problems, ...warnings].map((text, i) =>
       el("li", { class: i < problems.length ? "problem" : "" }, text)));
     get("save").disabled = problems.length > 0;
-    const names = found.map(({ border }) => border.name), flows = flowsOf(found);
+    const names = found.filter(({ border }) => border.hasFlows).map(({ border }) => border.name), flows = flowsOf(found);
     get("flows").parentElement.hidden = names.length < 2;
     const row = (cell, ...texts) => el("tr", {}, ...texts.map(text => el(cell, {}, String(text))));
     get("flows").replaceChildren(row("th", "from", ...names.map(name => `to ${name}`), "to none"),
