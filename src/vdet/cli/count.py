@@ -10,9 +10,11 @@ from vdet.cli.command import command
 from vdet.cli.messages import LOG, announce, print_lines, progress_steps
 from vdet.config.classes import OUR_NAMES, our_names
 from vdet.errors import DOUBTFUL, counted
-from vdet.files import OutputFiles, output_errors
+from vdet.files import OutputFiles, output_errors, write_text
 
 if TYPE_CHECKING:
+    from vdet.config.schema import Settings
+    from vdet.run.sinks import Output
     from vdet.traffic.counts import Counts
 
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 @click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
 @options.counts_option
 @options.flows_option
+@options.output_folders("--page", help="Write a page about all TRACKS, page.html, into DIR.")
 @options.interval_option
 @options.corrections_option
 @options.begin_option
@@ -77,10 +80,9 @@ def count(
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.corrections import read_corrections
     from vdet.traffic.counting import count_files
-    from vdet.traffic.output import counts_content, flows_content
-    from vdet.traffic.tables import write_content
 
-    files = OutputFiles(overwrite=overwrite, inputs=source.inputs(*tracks, *corrections))
+    inputs = source.inputs(*tracks, *corrections, settings=settings)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs)
     check_sinks(outputs, files)
     reviews = read_corrections(corrections)
     with progress_steps(" files") as steps:
@@ -96,16 +98,37 @@ def count(
         LOG.warning("--class %s: no vehicle of this class was counted", name)
     with files:
         for output in outputs:
-            content_of = {"counts": counts_content, "flows": flows_content}[output.sink]
-            content = content_of(output.path, videos, settings.traffic.seconds)
             with output_errors(output.path):
-                write_content(files.stage(output.path), content)
+                _write(output, files, videos, settings)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
     for name, result in videos.items():
         if result.corrected:
             print_lines(f"{name}: {result.corrected}")
     is_doubtful = any(result.doubts for result in videos.values())
     return DOUBTFUL if strict and is_doubtful else 0
+
+
+def _write(
+    output: "Output", files: OutputFiles, videos: "Mapping[str, Counts]", settings: "Settings"
+) -> None:
+    """Write a table, a workbook or a page."""
+    from vdet.pages.counts import counts_page, survey_picture
+    from vdet.pages.render import PAGE_NAME, jpeg
+    from vdet.traffic.output import counts_content, flows_content, is_workbook
+    from vdet.traffic.survey import Survey
+    from vdet.traffic.tables import write_content
+    from vdet.traffic.workbook import PICTURE_WIDTH, write_workbook
+
+    if output.sink == "page":
+        page = counts_page(videos, settings)
+        return write_text(files.stage_folder(output.path) / PAGE_NAME, page)
+    path = files.stage(output.path)
+    if is_workbook(output.path):
+        image = survey_picture(videos, settings)
+        picture = None if image is None else jpeg(image, PICTURE_WIDTH)
+        return write_workbook(path, Survey(videos, settings).sheets(picture))
+    content = {"counts": counts_content, "flows": flows_content}[output.sink]
+    return write_content(path, content(output.path, videos, settings.traffic.seconds))
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:

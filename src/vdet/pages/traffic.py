@@ -7,16 +7,18 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from vdet.boxes import Image
+from vdet.config.shapes import TrafficSettings
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
 from vdet.pages.render import Table
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
-from vdet.traffic.crossings import Border, Line
+from vdet.traffic.crossings import Border, Line, lines_and_zones
 from vdet.traffic.records import VehicleRecord
 
 _NO_DESTINATION = "–"
@@ -153,6 +155,18 @@ def with_marks(image: Image, marks: Iterable[Mark]) -> Image:
     drawn = image.copy()
     draw_marks(drawn, marks)
     return drawn
+
+
+def scene_picture(
+    image: Image,
+    settings: TrafficSettings,
+    counts: Counts,
+    paths: Mapping[int, Sequence[Point]] = MappingProxyType({}),
+) -> Image:
+    """Return a frame with lines, zones, counts, and flows where their `paths` are known."""
+    height, width = image.shape[:2]
+    lines, zones = lines_and_zones(settings, width, height)
+    return with_marks(image, traffic_marks((width, height), (*lines, *zones), counts, paths))
 
 
 def direction_table(counts: Counts) -> Table:

@@ -5,7 +5,7 @@ Tables cover the whole video or intervals of it. Several videos have one table.
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING, TypeVar
 
@@ -232,6 +232,12 @@ class Counts:
 
         names = [column.name for column in fields(CountRow)]
         return pd.DataFrame(self.table(interval), columns=names)
+
+
+def joined_counts(videos: Sequence[Counts]) -> Counts:
+    """Return the counts of several videos at the same lines as those of one, without times."""
+    events = tuple(event for video in videos for event in video.events)
+    return replace(videos[0], events=events, spans=((0.0, 0.0),), clock=None)
 
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:

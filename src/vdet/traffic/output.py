@@ -30,11 +30,16 @@ _EVENTS = ("time", "clock", *_columns(Event)[1:])
 ALL = "all"
 """In wide tables, the name of a sum."""
 
-COUNT_SUFFIXES = (".csv", ".json", ".totals.csv", ".zones.csv", ".wide.csv")
-FLOW_SUFFIXES = (".csv", ".json", ".matrix.csv", ".wide.csv")
+COUNT_SUFFIXES = (".csv", ".json", ".totals.csv", ".zones.csv", ".wide.csv", ".xlsx")
+FLOW_SUFFIXES = (".csv", ".json", ".matrix.csv", ".wide.csv", ".xlsx")
 
 Videos = Mapping[str, Counts]
 """The counts of videos by their names."""
+
+
+def is_workbook(path: Path) -> bool:
+    """Return whether a file is a workbook by its name."""
+    return path.suffix.lower() == ".xlsx"
 
 
 def counts_content(path: Path, videos: Videos, interval: int | None = None) -> Any:

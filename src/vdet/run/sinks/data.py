@@ -23,11 +23,17 @@ from vdet.labels.formats import (
 )
 from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
+from vdet.media import Picture
+from vdet.media.images import read_image
+from vdet.pages.render import jpeg
+from vdet.pages.traffic import scene_picture
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output
 from vdet.traffic.records import join_records, records_content
+from vdet.traffic.survey import Survey
 from vdet.traffic.tables import SUFFIXES, check_table, write_content
+from vdet.traffic.workbook import PICTURE_WIDTH, write_workbook
 from vdet.version import __version__
 
 MakeContent = Callable[[Path, output.Videos, int | None], Any]
@@ -200,7 +206,34 @@ VEHICLES = SinkKind(
 )
 
 
-def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> TableSink:
+class WorkbookSink(BaseSink):
+    """Writes the workbook, with the frame that shows the most vehicles."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        picture = context.settings.survey.picture
+        self._image = read_image(Path(picture)) if picture else None
+        self._fullest: Picture | None = None
+        self._most = -1
+
+    def write(self, result: FrameResult) -> None:
+        """Look for more vehicles."""
+        if self._image is None and len(result.tracks) > self._most:
+            self._fullest, self._most = result.frame.picture, len(result.tracks)
+
+    def finish(self) -> None:
+        """Write the file."""
+        settings, counts = self.context.settings, self.traffic.counts()
+        image = self._fullest.image if self._fullest else self._image
+        assert counts
+        assert image is not None  # a run has frames
+        paths = {vehicle.id: vehicle.path for vehicle in self.traffic.vehicles}
+        picture = jpeg(scene_picture(image, settings.traffic, counts, paths), PICTURE_WIDTH)
+        survey = Survey({self.video.path.name: counts}, settings)
+        write_workbook(self.context.files.stage(self.path), survey.sheets(picture))
+
+
+def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> BaseSink:
     """Return a sink of the counts at lines and in zones, or of the flows.
 
     `make` is `counts_content` or `flows_content`; the ending of the name selects the table.
@@ -208,6 +241,9 @@ def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> TableSin
     traffic = context.settings.traffic
     if not traffic:
         raise OutputError(f"{path}: no lines or zones to count at; add them to the settings")
+
+    if output.is_workbook(path):
+        return WorkbookSink(path, context)
 
     def content(sink: TableSink) -> Any:
         counts = sink.traffic.counts()

@@ -1,0 +1,95 @@
+"""The page of `vdet count`: all files of a camera, such as those of a day."""
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from vdet.boxes import Image
+from vdet.config.schema import Settings
+from vdet.media.images import read_image
+from vdet.pages.charts import Plot, interval_plot, time_axis
+from vdet.pages.render import Table, render
+from vdet.pages.traffic import flow_table, scene_picture
+from vdet.traffic.clock import Intervals
+from vdet.traffic.counts import Counts, joined_counts
+from vdet.traffic.survey import Survey
+from vdet.traffic.workbook import Cell, SheetTable
+
+_INTERVAL = 900
+"""Seconds of an interval of the chart, unless the settings have one."""
+
+
+def survey_picture(videos: Mapping[str, Counts], settings: Settings) -> Image | None:
+    """Return the picture of the settings with lines and counts, if there is one.
+
+    Raises
+    ------
+    ImageError
+        The picture cannot be read.
+    ConfigError
+        It has another aspect ratio than the frames.
+    """
+    if not settings.survey.picture:
+        return None
+    counts = joined_counts(list(videos.values()))
+    return scene_picture(read_image(Path(settings.survey.picture)), settings.traffic, counts)
+
+
+def counts_page(videos: Mapping[str, Counts], settings: Settings) -> str:
+    """Return the page; errors as for `survey_picture` and `Survey`."""
+    survey = Survey(videos, settings)
+    facts, volumes, files = survey.facts(), survey.volumes(), survey.files()
+    return render(
+        "counts.html",
+        title=facts.title,
+        facts=_texts(facts)[1],
+        volumes=_texts(volumes),
+        flows=flow_table(joined_counts(list(videos.values()))),
+        files=_texts(files),
+        notes=_texts(survey.notes())[1],
+        plot=_plot(list(videos.values()), settings.traffic.seconds or _INTERVAL),
+        picture=survey_picture(videos, settings),
+        doubts={name: (*counts.doubts, *counts.warnings) for name, counts in videos.items()},
+    )
+
+
+def _texts(table: SheetTable) -> Table:
+    rows = [
+        [_text(cell, column.number_format) for cell, column in zip(row, table.columns, strict=True)]
+        for row in table.rows
+    ]
+    return [column.heading for column in table.columns], rows
+
+
+def _text(cell: Cell, number_format: str) -> str:
+    """Return a cell as a spreadsheet shows it."""
+    match cell:
+        case None:
+            return ""
+        case datetime():
+            return f"{cell:%Y-%m-%d %H:%M:%S}"
+        case timedelta():
+            return str(timedelta(seconds=round(cell.total_seconds())))
+        case float() if number_format.startswith("0"):
+            decimals = len(number_format.rstrip("%").partition(".")[2])
+            return f"{cell:.{decimals}{'%' if number_format.endswith('%') else 'f'}}"
+    return str(cell)
+
+
+def _plot(counts: list[Counts], length: int) -> Plot | None:
+    """Return the vehicles in each direction by interval; None if some of several have no clock."""
+    if len(counts) > 1 and not all(video.clock for video in counts):
+        return None
+    intervals = Intervals([(video.clock, video.spans) for video in counts], length)
+    first, last = intervals.periods[0], intervals.periods[-1]
+    series: defaultdict[str, Counter[float]] = defaultdict(Counter)
+    for index, video in enumerate(counts):
+        for event in video.events:
+            start = intervals.number(index, event.time) - first.number
+            series[f"{event.name}: {event.direction}"][start] += 1
+    zero = None
+    if isinstance(first.start, datetime):
+        zero = 3600.0 * first.start.hour + 60 * first.start.minute + first.start.second
+    x = time_axis(0, last.number + length - first.number, zero)
+    return interval_plot(series, x, length, "Vehicles by interval", zero) if series else None
