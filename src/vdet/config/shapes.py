@@ -232,6 +232,11 @@ class TrafficSettings(Section):
         return {**directions, **{zone.name: ZONE_DIRECTIONS for zone in self.zones}}
 
     @property
+    def outside_flows(self) -> tuple[str, ...]:
+        """The names of the lines and zones at which flows neither begin nor end."""
+        return tuple(shape.name for shape in self.shapes if not shape.flows)
+
+    @property
     def seconds(self) -> int | None:
         """The interval in seconds; None for the whole video."""
         if self.interval is None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from vdet.boxes import Image
 from vdet.config.schema import Settings
+from vdet.errors import clock_text
 from vdet.media.images import read_image
 from vdet.pages.charts import Plot, interval_plot, time_axis
 from vdet.pages.render import Table, render
@@ -55,25 +56,19 @@ def counts_page(videos: Mapping[str, Counts], settings: Settings) -> str:
 
 
 def _texts(table: SheetTable) -> Table:
-    rows = [
-        [_text(cell, column.number_format) for cell, column in zip(row, table.columns, strict=True)]
-        for row in table.rows
-    ]
-    return [column.heading for column in table.columns], rows
+    return table.headings, [list(map(_text, row)) for row in table.rows]
 
 
-def _text(cell: Cell, number_format: str) -> str:
-    """Return a cell as a spreadsheet shows it."""
+def _text(cell: Cell) -> str:
     match cell:
         case None:
             return ""
         case datetime():
             return f"{cell:%Y-%m-%d %H:%M:%S}"
         case timedelta():
-            return str(timedelta(seconds=round(cell.total_seconds())))
-        case float() if number_format.startswith("0"):
-            decimals = len(number_format.rstrip("%").partition(".")[2])
-            return f"{cell:.{decimals}{'%' if number_format.endswith('%') else 'f'}}"
+            return clock_text(int(cell.total_seconds()), hours=True)
+        case float():
+            return f"{round(cell, 2):g}"
     return str(cell)
 
 

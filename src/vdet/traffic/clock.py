@@ -352,15 +352,12 @@ class Intervals:
         """Return the start of an interval of some length, in the time of one of the videos."""
         return round(number - self._zeros[index], 3)
 
-    def covered(self, period: Interval) -> float:
-        """Return the seconds of video in an interval."""
-        return _common(self._every, period.first, period.last)
-
     def _interval(self, number: int) -> Interval:
         start, end = self._first, self._last
         if self._length is not None:
             start, end = float(number), float(self._end(number))
-        observed = _common(self._observed, start, end)
+        common = (min(end, b) - max(start, a) for a, b in self._observed)
+        observed = sum(seconds for seconds in common if seconds > 0)
         return Interval(
             number=number,
             start=self._clock_time(start),
@@ -376,8 +373,3 @@ class Intervals:
             time = _EPOCH + timedelta(milliseconds=round(1000 * seconds))
             return time.astimezone(self._zone)
         return round(seconds, 3) if self._is_timed else None
-
-
-def _common(spans: Sequence[Span], start: float, end: float) -> float:
-    """Return how many seconds of spans are between two moments."""
-    return sum(max(0.0, min(end, last) - max(start, first)) for first, last in spans)

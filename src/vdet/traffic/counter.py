@@ -113,11 +113,7 @@ class VehicleCounter:
             zones=tuple(zone.name for zone in self.zones),
             spans=tuple(self.spans) or ((0.0, 0.0),),
             warnings=tuple(warnings),
-            outside_flows=tuple(
-                shape.name
-                for shape in (*self._settings.traffic.lines, *self._settings.traffic.zones)
-                if not shape.flows
-            ),
+            outside_flows=self._settings.traffic.outside_flows,
             classes=self._settings.classes or self._settings.detector.vehicle_classes,
         )
 

@@ -359,8 +359,7 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
                 changes[intervals.number_at(time)].append(change)
         inside = 0
         for period in intervals.periods:
-            covered = intervals.covered(period)
-            rows.append(_zone_row(name, period, covered, sorted(changes[period.number]), inside))
+            rows.append(_zone_row(name, period, sorted(changes[period.number]), inside))
             inside += sum(change.vehicles for change in changes[period.number])
     return rows
 
@@ -377,13 +376,8 @@ class _Change:
     stay: float | None = field(compare=False)
 
 
-def _zone_row(
-    name: str, period: Interval, covered: float, changes: Sequence[_Change], inside: int
-) -> ZoneRow:
-    """Return the use in one interval.
-
-    It has `covered` seconds of video, and `inside` vehicles at its start.
-    """
+def _zone_row(name: str, period: Interval, changes: Sequence[_Change], inside: int) -> ZoneRow:
+    """Return the use in one interval, with `inside` vehicles at its start."""
     levels = list(accumulate((change.vehicles for change in changes), initial=inside))
     times = [period.first, *(change.time for change in changes), period.last]
     used = sum(n * (b - a) for n, (a, b) in zip(levels, pairwise(times), strict=True))
@@ -394,7 +388,8 @@ def _zone_row(
         name=name,
         entered=sum(change.vehicles > 0 for change in changes),
         left=sum(change.vehicles < 0 for change in changes),
-        mean=round(used / covered, 3) if covered else float(inside),  # 0: it has only one frame
+        # Without seconds, it has only one frame.
+        mean=round(used / period.observed, 3) if period.observed else float(inside),
         max=max(levels),
         mean_stay=round(sum(stays) / len(stays), 3) if stays else None,
         max_stay=max(stays, default=None),

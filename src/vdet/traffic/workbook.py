@@ -1,47 +1,34 @@
 """Workbooks, `.xlsx`: sheets of tables, ready to print."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cache
 from io import BytesIO
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 Cell = str | float | datetime | timedelta | None
 """A clock time is written without its zone, and None as an empty cell."""
+PICTURE_WIDTH = 1280
+"""Width of a picture, pixels."""
 
 _LAST_ROW = 1_048_575
 _A4 = 9
-PICTURE_WIDTH = 1280
-"""Width of a picture, pixels."""
 _PICTURE_SCALE = 0.6
-_CLOCK, _DURATION = "yyyy-mm-dd hh:mm:ss", "[h]:mm:ss"
+_NARROWEST, _WIDEST = 7, 80
+"""Widths of columns in characters; longer text is wrapped."""
+_NUMBER, _DURATION, _CLOCK = "0.0##", "[h]:mm:ss", "yyyy-mm-dd hh:mm:ss"
 _TITLE = {"bold": True, "font_size": 14}
-_HEADING = {
-    "bold": True, "text_wrap": True, "valign": "top", "bottom": 1, "bg_color": "#E6F4F1",
-}  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Column:
-    """A column: its width in characters, and the format of numbers as spreadsheets have it.
-
-    Text goes on over the empty cells to its right unless it is wrapped.
-    """
-
-    heading: str = ""
-    width: int = 10
-    number_format: str = "General"
-    is_wrapped: bool = False
+_HEADING = {"bold": True, "text_wrap": True, "valign": "top", "bottom": 1, "bg_color": "#E6F4F1"}
 
 
 @dataclass(frozen=True, slots=True)
 class SheetTable:
-    """A table in a sheet; without headings if all are empty."""
+    """A table in a sheet; without headings if it has none."""
 
-    columns: Sequence[Column]
+    headings: Sequence[str]
     rows: Iterable[Sequence[Cell]]
     title: str = ""
 
@@ -50,8 +37,7 @@ class SheetTable:
 class Sheet:
     """Tables below one another, and below these a picture: a JPEG file, not over `PICTURE_WIDTH`.
 
-    A single table without a title has a filter, and headings that are frozen and printed on each
-    page.
+    A single table has a filter, and headings that are frozen and printed on each page.
     """
 
     name: str
@@ -68,65 +54,74 @@ def write_workbook(path: Path, sheets: Iterable[Sheet]) -> None:
         with Workbook(path, {"constant_memory": True}) as book:
             style = cache(lambda **values: book.add_format(values))
             for sheet in sheets:
-                _write_sheet(book.add_worksheet(sheet.name), sheet, style)
+                _SheetWriter(book.add_worksheet(sheet.name), style).write(sheet)
     except FileCreateError as error:
         raise OSError(str(error)) from error
 
 
-def _write_sheet(page: Any, sheet: Sheet, style: Callable[..., Any]) -> None:
-    page.set_landscape()
-    page.set_paper(_A4)
-    page.fit_to_pages(1, 1 if sheet.picture else 0)
-    page.set_footer("&L&F, &A&RPage &P of &N")
-    for number, columns in enumerate(zip_longest(*(table.columns for table in sheet.tables))):
-        page.set_column(number, number, max(column.width for column in filter(None, columns)))
-    row = 0
-    for table in sheet.tables:
-        row = _write_table(page, table, row, style)
-    if len(sheet.tables) == 1 and not sheet.tables[0].title:
-        page.freeze_panes(1, 0)
-        page.repeat_rows(0)
-        page.autofilter(0, 0, max(1, row - 2), len(sheet.tables[0].columns) - 1)
-    if sheet.picture:
-        scale = {"x_scale": _PICTURE_SCALE, "y_scale": _PICTURE_SCALE}
-        page.insert_image(row, 0, "scene", {"image_data": BytesIO(sheet.picture), **scale})
+class _SheetWriter:
+    """Writes a sheet; `style` makes the format of a cell."""
 
+    def __init__(self, page: Any, style: Callable[..., Any]) -> None:
+        self._page, self._style = page, style
+        self._row = 0
+        self._widths: Counter[int] = Counter()
 
-def _write_table(page: Any, table: SheetTable, row: int, style: Callable[..., Any]) -> int:
-    """Write a table from a row on; return the row for the next one."""
-    if table.title:
-        page.write_string(row, 0, _valid(table.title), style(**_TITLE))
-        row += 1
-    if any(column.heading for column in table.columns):
-        for number, column in enumerate(table.columns):
-            page.write_string(row, number, _valid(column.heading), style(**_HEADING))
-        row += 1
-    for cells in table.rows:
-        if row == _LAST_ROW:
-            page.write_string(row, 0, "more rows do not fit into a sheet; .csv has all")
-            break
-        for number, (cell, column) in enumerate(zip(cells, table.columns, strict=True)):
-            _write_cell(page, (row, number), cell, column, style)
-        row += 1
-    return row + 1
+    def write(self, sheet: Sheet) -> None:
+        for table in sheet.tables:
+            self._table(table)
+            self._row += 1
+        for column, width in self._widths.items():
+            self._page.set_column(column, column, min(max(width, _NARROWEST), _WIDEST) + 2)
+        self._page.set_landscape()
+        self._page.set_paper(_A4)
+        self._page.fit_to_pages(1, 1 if sheet.picture else 0)
+        self._page.set_footer("&L&F, &A&RPage &P of &N")
+        if len(sheet.tables) == 1:
+            self._page.freeze_panes(1, 0)
+            self._page.repeat_rows(0)
+            self._page.autofilter(0, 0, max(1, self._row - 2), len(self._widths) - 1)
+        if sheet.picture:
+            scale = {"x_scale": _PICTURE_SCALE, "y_scale": _PICTURE_SCALE}
+            options = {"image_data": BytesIO(sheet.picture), **scale}
+            self._page.insert_image(self._row, 0, "scene", options)
 
+    def _table(self, table: SheetTable) -> None:
+        if table.title:
+            self._page.write_string(self._row, 0, _valid(table.title), self._style(**_TITLE))
+            self._row += 1
+        for column, heading in enumerate(table.headings):
+            self._page.write_string(self._row, column, _valid(heading), self._style(**_HEADING))
+            self._widen(column, max(map(len, heading.split())))
+        self._row += bool(table.headings)
+        for row in table.rows:
+            if self._row == _LAST_ROW:
+                self._cell(0, "more rows do not fit into a sheet; .csv has all")
+                break
+            for column, cell in enumerate(row):
+                self._cell(column, cell)
+            self._row += 1
 
-def _write_cell(
-    page: Any, at: tuple[int, int], cell: Cell, column: Column, style: Callable[..., Any]
-) -> None:
-    """Write a cell at a row and column."""
-    match cell:
-        case None:
-            pass
-        case str():
-            page.write_string(*at, _valid(cell), style(text_wrap=column.is_wrapped, valign="top"))
-        case datetime():
-            time = cell.replace(tzinfo=None)
-            page.write_datetime(*at, time, style(num_format=_CLOCK, align="left"))
-        case timedelta():
-            page.write_datetime(*at, cell, style(num_format=_DURATION, align="left"))
-        case _:
-            page.write_number(*at, cell, style(num_format=column.number_format))
+    def _cell(self, column: int, cell: Cell) -> None:
+        at, left = (self._row, column), {"align": "left"}
+        match cell:
+            case str():
+                wrap = len(cell) > _WIDEST
+                self._page.write_string(*at, _valid(cell), self._style(text_wrap=wrap))
+                self._widen(column, len(cell))
+            case datetime():
+                time, style = cell.replace(tzinfo=None), self._style(num_format=_CLOCK, **left)
+                self._page.write_datetime(*at, time, style)
+                self._widen(column, len(_CLOCK))
+            case timedelta():
+                self._page.write_datetime(*at, cell, self._style(num_format=_DURATION, **left))
+            case int():
+                self._page.write_number(*at, cell)
+            case float():
+                self._page.write_number(*at, cell, self._style(num_format=_NUMBER))
+
+    def _widen(self, column: int, width: int) -> None:
+        self._widths[column] = max(self._widths[column], width)
 
 
 def _valid(text: str) -> str:
