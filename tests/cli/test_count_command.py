@@ -5,10 +5,13 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
+import openpyxl
 import pytest
 
 from conftest import Run
 from running import rows_of, write_drive
+from vdet.media.images import encode_image
 
 LINES = """
 camera: {size: [320, 240]}
@@ -106,6 +109,41 @@ def write_tracks(path: Path, *, shift: int = 0) -> Path:
     rows = [f"{n},{n / 25:.6f},1,{shift + 4 * n},100,40,40,0.9,detected" for n in range(50)]
     path.write_text("\n".join(["frame,time,id,x,y,width,height,score,state", *rows]) + "\n")
     return path
+
+
+def test_a_workbook_and_a_page_show_all_files_on_a_picture(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    scene = tmp_path / "scene.png"
+    scene.write_bytes(encode_image(np.full((240, 320, 3), 99, np.uint8), scene))
+    settings = tmp_path / "site.yaml"
+    settings.write_text("survey: {site: '<b>Elm Street', picture: scene.png}\n")
+    tracks = [write_tracks(tmp_path / f"cam_20260501_07{n}000.csv") for n in range(2)]
+    book, page = tmp_path / "day.xlsx", tmp_path / "day"
+    lines = ("-c", folder / "lines.yaml", "-c", settings, "--interval", "5min")
+    run("count", *tracks, *lines, "--counts", book, "--page", page, code=0)
+    sheets = openpyxl.load_workbook(book)
+    names = "Summary Intervals Flows Zones Vehicles Files Notes"
+    assert (sheets.sheetnames, len(sheets["Summary"]._images)) == (names.split(), 1)
+    text = (page / "page.html").read_text()
+    assert text.count("data:image/jpeg") == 1
+    assert "<title>&lt;b&gt;Elm Street</title>" in text
+    assert "gap of 598 s" in text
+    scene.unlink()
+    result = run("count", *tracks, *lines, "--flows", tmp_path / "f.xlsx", code=1)
+    assert "scene.png: cannot be read: No such file" in result.err
+
+
+def test_the_workbook_of_a_run_has_a_frame(
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
+    book = tmp_path / "red.xlsx"
+    wanted = ("--no-video", "--flows", book, "-c", folder / "lines.yaml")
+    run("detect-video", folder / "red.mp4", *red, *wanted, code=0)
+    sheets = openpyxl.load_workbook(book)
+    (picture,) = sheets["Summary"]._images
+    assert (picture.width, picture.height) == (320, 240)
+    assert [cell.value for cell in sheets["Flows"][2]][4:7] == ["gate", "yard", 1]
 
 
 def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:

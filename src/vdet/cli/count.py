@@ -1,6 +1,7 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -13,6 +14,7 @@ from vdet.errors import DOUBTFUL, counted
 from vdet.files import OutputFiles, output_errors, write_text
 
 if TYPE_CHECKING:
+    from vdet.boxes import Image
     from vdet.config.schema import Settings
     from vdet.run.sinks import Output
     from vdet.traffic.counts import Counts
@@ -65,7 +67,7 @@ def count(
     Examples:
       vdet count tracks.jsonl -c gate.yaml
       vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min
-      vdet count found/*.tracks.csv -c gate.yaml --counts counts.json
+      vdet count day/*.jsonl -c gate.yaml --counts day.xlsx --page day
     """
     from vdet.batch.manifest import MANIFEST
 
@@ -77,6 +79,7 @@ def count(
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
+    from vdet.media.images import read_image
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.corrections import read_corrections
     from vdet.traffic.counting import count_files
@@ -84,7 +87,8 @@ def count(
     inputs = source.inputs(*tracks, *corrections, settings=settings)
     files = OutputFiles(overwrite=overwrite, inputs=inputs)
     check_sinks(outputs, files)
-    reviews = read_corrections(corrections)
+    reviews, picture = read_corrections(corrections), settings.survey.picture
+    scene = read_image(Path(picture)) if picture else None
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         videos = count_files(tracks, settings, size, rate, corrections=reviews, advance=advance)
@@ -99,7 +103,7 @@ def count(
     with files:
         for output in outputs:
             with output_errors(output.path):
-                _write(output, files, videos, settings)
+                _write(output, files, videos, settings, scene)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
     for name, result in videos.items():
         if result.corrected:
@@ -109,23 +113,30 @@ def count(
 
 
 def _write(
-    output: "Output", files: OutputFiles, videos: "Mapping[str, Counts]", settings: "Settings"
+    output: "Output",
+    files: OutputFiles,
+    videos: "Mapping[str, Counts]",
+    settings: "Settings",
+    scene: "Image | None",
 ) -> None:
-    """Write a table, a workbook or a page."""
-    from vdet.pages.counts import counts_page, survey_picture
+    """Write a table, a workbook or a page; `scene` is the picture of the settings."""
+    from vdet.pages.counts import counts_page
     from vdet.pages.render import PAGE_NAME, jpeg
+    from vdet.pages.traffic import scene_picture
+    from vdet.traffic.counts import joined_counts
     from vdet.traffic.output import counts_content, flows_content, is_workbook
     from vdet.traffic.survey import Survey
     from vdet.traffic.tables import write_content
     from vdet.traffic.workbook import PICTURE_WIDTH, write_workbook
 
+    if scene is not None:
+        scene = scene_picture(scene, settings.traffic, joined_counts(list(videos.values())))
     if output.sink == "page":
-        page = counts_page(videos, settings)
-        return write_text(files.stage_folder(output.path) / PAGE_NAME, page)
+        path, page = files.stage_folder(output.path), counts_page(videos, settings, scene)
+        return write_text(path / PAGE_NAME, page)
     path = files.stage(output.path)
     if is_workbook(output.path):
-        image = survey_picture(videos, settings)
-        picture = None if image is None else jpeg(image, PICTURE_WIDTH)
+        picture = None if scene is None else jpeg(scene, PICTURE_WIDTH)
         return write_workbook(path, Survey(videos, settings).sheets(picture))
     content = {"counts": counts_content, "flows": flows_content}[output.sink]
     return write_content(path, content(output.path, videos, settings.traffic.seconds))

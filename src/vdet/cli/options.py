@@ -73,13 +73,14 @@ jobs_option = partial(number_option, "--jobs", type=PROCESSES, show_default="one
 counts_option = output_files(
     "--counts",
     help="Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and "
-    ".zones.csv have tables by interval, .json has everything. Can be repeated.",
+    ".zones.csv have tables by interval, .json has everything, .xlsx is a workbook of the survey. "
+    "Can be repeated.",
 )
 flows_option = output_files(
     "--flows",
     help="Write flows from one line or zone to another: .csv has a row for each interval, flow and "
     "class, .wide.csv has a row for each interval, with sums, .matrix.csv has a matrix, .json has "
-    "the flows and the matrix. Can be repeated.",
+    "the flows and the matrix, .xlsx is as for --counts. Can be repeated.",
 )
 interval_option = click.option(
     "--interval",

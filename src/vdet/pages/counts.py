@@ -3,15 +3,13 @@
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from datetime import datetime, timedelta
-from pathlib import Path
 
 from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.errors import clock_text
-from vdet.media.images import read_image
 from vdet.pages.charts import Plot, interval_plot, time_axis
 from vdet.pages.render import Table, render
-from vdet.pages.traffic import flow_table, scene_picture
+from vdet.pages.traffic import flow_table
 from vdet.traffic.clock import Intervals
 from vdet.traffic.counts import Counts, joined_counts
 from vdet.traffic.survey import Survey
@@ -21,37 +19,22 @@ _INTERVAL = 900
 """Seconds of an interval of the chart, unless the settings have one."""
 
 
-def survey_picture(videos: Mapping[str, Counts], settings: Settings) -> Image | None:
-    """Return the picture of the settings with lines and counts, if there is one.
-
-    Raises
-    ------
-    ImageError
-        The picture cannot be read.
-    ConfigError
-        It has another aspect ratio than the frames.
-    """
-    if not settings.survey.picture:
-        return None
-    counts = joined_counts(list(videos.values()))
-    return scene_picture(read_image(Path(settings.survey.picture)), settings.traffic, counts)
-
-
-def counts_page(videos: Mapping[str, Counts], settings: Settings) -> str:
-    """Return the page; errors as for `survey_picture` and `Survey`."""
-    survey = Survey(videos, settings)
-    facts, volumes, files = survey.facts(), survey.volumes(), survey.files()
+def counts_page(
+    videos: Mapping[str, Counts], settings: Settings, picture: Image | None = None
+) -> str:
+    """Return the page; `picture` is the scene with lines and counts. Errors as for `Survey`."""
+    survey, counts = Survey(videos, settings), list(videos.values())
+    facts = survey.facts()
     return render(
         "counts.html",
         title=facts.title,
         facts=_texts(facts)[1],
-        volumes=_texts(volumes),
-        flows=flow_table(joined_counts(list(videos.values()))),
-        files=_texts(files),
+        volumes=_texts(survey.volumes()),
+        flows=flow_table(joined_counts(counts)),
+        files=_texts(survey.files()),
         notes=_texts(survey.notes())[1],
-        plot=_plot(list(videos.values()), settings.traffic.seconds or _INTERVAL),
-        picture=survey_picture(videos, settings),
-        doubts={name: (*counts.doubts, *counts.warnings) for name, counts in videos.items()},
+        plot=_plot(counts, settings.traffic.seconds or _INTERVAL),
+        picture=picture,
     )
 
 
