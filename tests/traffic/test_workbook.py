@@ -9,8 +9,8 @@ import numpy as np
 import openpyxl
 import pytest
 
+from vdet.boxes import Image
 from vdet.config.schema import Settings
-from vdet.pages.render import jpeg
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Checked, Corrected, Counts, Event
 from vdet.traffic.measures import movement
@@ -79,7 +79,7 @@ def morning() -> dict[str, Counts]:
     return {"07.jsonl": hour, "08.jsonl": rest}
 
 
-def written(path: Path, survey: Survey, picture: bytes | None = None) -> Path:
+def written(path: Path, survey: Survey, picture: Image | None = None) -> Path:
     write_workbook(path, survey.sheets(picture))
     return path
 
@@ -100,7 +100,7 @@ def text_of(cell: Any) -> str:
 
 @pytest.fixture
 def book(tmp_path: Path) -> Path:
-    picture = jpeg(np.full((90, 160, 3), 99, np.uint8))
+    picture = np.full((90, 160, 3), 99, np.uint8)
     return written(tmp_path / "c.xlsx", Survey(morning(), settings()), picture)
 
 

@@ -121,13 +121,13 @@ def _write(
 ) -> None:
     """Write a table, a workbook or a page; `scene` is the picture of the settings."""
     from vdet.pages.counts import counts_page
-    from vdet.pages.render import PAGE_NAME, jpeg
+    from vdet.pages.render import PAGE_NAME
     from vdet.pages.traffic import scene_picture
     from vdet.traffic.counts import joined_counts
     from vdet.traffic.output import counts_content, flows_content, is_workbook
     from vdet.traffic.survey import Survey
     from vdet.traffic.tables import write_content
-    from vdet.traffic.workbook import PICTURE_WIDTH, write_workbook
+    from vdet.traffic.workbook import write_workbook
 
     if scene is not None:
         scene = scene_picture(scene, settings.traffic, joined_counts(list(videos.values())))
@@ -136,8 +136,7 @@ def _write(
         return write_text(path / PAGE_NAME, page)
     path = files.stage(output.path)
     if is_workbook(output.path):
-        picture = None if scene is None else jpeg(scene, PICTURE_WIDTH)
-        return write_workbook(path, Survey(videos, settings).sheets(picture))
+        return write_workbook(path, Survey(videos, settings).sheets(scene))
     content = {"counts": counts_content, "flows": flows_content}[output.sink]
     return write_content(path, content(output.path, videos, settings.traffic.seconds))
 

@@ -39,7 +39,11 @@ def counts_page(
 
 
 def _texts(table: SheetTable) -> Table:
-    return table.headings, [list(map(_text, row)) for row in table.rows]
+    """Return a table as text, without the classes that no vehicle has."""
+    rows = [list(map(_text, row)) for row in table.rows]
+    shown = [n for n, cells in enumerate(zip(*rows, strict=True)) if n < 3 or {*cells} - {"", "0"}]
+    headings = [table.headings[n] for n in shown] if table.headings else []
+    return headings, [[row[n] for n in shown] for row in rows]
 
 
 def _text(cell: Cell) -> str:
@@ -47,7 +51,7 @@ def _text(cell: Cell) -> str:
         case None:
             return ""
         case datetime():
-            return f"{cell:%Y-%m-%d %H:%M:%S}"
+            return f"{cell:%Y-%m-%d %H:%M}"
         case timedelta():
             return clock_text(int(cell.total_seconds()), hours=True)
         case float():

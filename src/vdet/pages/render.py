@@ -40,18 +40,13 @@ def render(template: str, **values: Any) -> str:
 
 
 def jpeg_uri(image: Image, max_side: int | None = None) -> str:
-    """Return an image as a data URI; see `jpeg`."""
-    return "data:image/jpeg;base64," + base64.b64encode(jpeg(image, max_side)).decode("ascii")
-
-
-def jpeg(image: Image, max_side: int | None = None) -> bytes:
-    """Return a BGR uint8 image as a file; its longer side has at most `max_side` pixels."""
+    """Return a BGR uint8 image as a data URI; its longer side has at most `max_side` pixels."""
     if max_side and (scale := max_side / max(image.shape[:2])) < 1:
         height, width = (max(1, round(side * scale)) for side in image.shape[:2])
         shrunk = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
         image = np.asarray(shrunk, np.uint8)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    return data.tobytes()
+    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
 
 
 def link_to(path: Path, folder: Path) -> str:

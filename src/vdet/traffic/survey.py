@@ -6,6 +6,7 @@ from contextlib import suppress
 from datetime import datetime, timedelta
 from itertools import groupby, product
 
+from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.config.shapes import NOWHERE
 from vdet.errors import ConfigError, clock_text, counted
@@ -50,7 +51,7 @@ class Survey:
         self._classes = tables.class_columns(self._counts)
         self._whole = self._intervals(None).periods[0]
 
-    def sheets(self, picture: bytes | None = None) -> list[Sheet]:
+    def sheets(self, picture: Image | None = None) -> list[Sheet]:
         """Return the sheets of the workbook; `picture` is the scene, as for `Sheet`."""
         counted_rows = tables.count_table(self._counts, self._length)
         flow_rows = tables.flow_table(self._counts, self._length)

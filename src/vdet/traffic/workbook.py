@@ -9,14 +9,16 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from vdet.boxes import Image
+from vdet.media.images import encode_image
+
 Cell = str | float | datetime | timedelta | None
 """A clock time is written without its zone, and None as an empty cell."""
-PICTURE_WIDTH = 1280
-"""Width of a picture, pixels."""
 
 _LAST_ROW = 1_048_575
 _A4 = 9
-_PICTURE_SCALE = 0.6
+_PICTURE_WIDTH = 768
+"""Width of a picture in a sheet: 20 cm, in pixels at 96 dpi."""
 _NARROWEST, _WIDEST = 7, 80
 """Widths of columns in characters; longer text is wrapped."""
 _NUMBER, _DURATION, _CLOCK = "0.0##", "[h]:mm:ss", "yyyy-mm-dd hh:mm:ss"
@@ -35,14 +37,14 @@ class SheetTable:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """Tables below one another, and below these a picture: a JPEG file, not over `PICTURE_WIDTH`.
+    """Tables below one another, and below these a picture, BGR uint8 `(H, W, 3)`.
 
     A single table has a filter, and headings that are frozen and printed on each page.
     """
 
     name: str
     tables: Sequence[SheetTable]
-    picture: bytes | None = None
+    picture: Image | None = None
 
 
 def write_workbook(path: Path, sheets: Iterable[Sheet]) -> None:
@@ -75,16 +77,17 @@ class _SheetWriter:
             self._page.set_column(column, column, min(max(width, _NARROWEST), _WIDEST) + 2)
         self._page.set_landscape()
         self._page.set_paper(_A4)
-        self._page.fit_to_pages(1, 1 if sheet.picture else 0)
+        self._page.fit_to_pages(1, 0 if sheet.picture is None else 1)
         self._page.set_footer("&L&F, &A&RPage &P of &N")
         if len(sheet.tables) == 1:
             self._page.freeze_panes(1, 0)
             self._page.repeat_rows(0)
             self._page.autofilter(0, 0, max(1, self._row - 2), len(self._widths) - 1)
-        if sheet.picture:
-            scale = {"x_scale": _PICTURE_SCALE, "y_scale": _PICTURE_SCALE}
-            options = {"image_data": BytesIO(sheet.picture), **scale}
-            self._page.insert_image(self._row, 0, "scene", options)
+        if sheet.picture is not None:
+            file = BytesIO(encode_image(sheet.picture, Path("scene.jpg")))
+            scale = _PICTURE_WIDTH / sheet.picture.shape[1]
+            options = {"image_data": file, "x_scale": scale, "y_scale": scale}
+            self._page.insert_image(self._row, 0, "scene.jpg", options)
 
     def _table(self, table: SheetTable) -> None:
         if table.title:

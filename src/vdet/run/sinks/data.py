@@ -25,7 +25,6 @@ from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.media import Picture
 from vdet.media.images import read_image
-from vdet.pages.render import jpeg
 from vdet.pages.traffic import scene_picture
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
@@ -33,7 +32,7 @@ from vdet.traffic import output
 from vdet.traffic.records import join_records, records_content
 from vdet.traffic.survey import Survey
 from vdet.traffic.tables import SUFFIXES, check_table, write_content
-from vdet.traffic.workbook import PICTURE_WIDTH, write_workbook
+from vdet.traffic.workbook import write_workbook
 from vdet.version import __version__
 
 MakeContent = Callable[[Path, output.Videos, int | None], Any]
@@ -228,7 +227,7 @@ class WorkbookSink(BaseSink):
         assert counts
         assert image is not None  # a run has frames
         paths = {vehicle.id: vehicle.path for vehicle in self.traffic.vehicles}
-        picture = jpeg(scene_picture(image, settings.traffic, counts, paths), PICTURE_WIDTH)
+        picture = scene_picture(image, settings.traffic, counts, paths)
         survey = Survey({self.video.path.name: counts}, settings)
         write_workbook(self.context.files.stage(self.path), survey.sheets(picture))
 
