@@ -28,5 +28,6 @@ The counts of a video depend only on its tracks (`FrameTracks`), live or from a 
 the frame, and computes the crossings of one path and one line or zone, without state. `counter`
 collects the events while frames are processed, and `counting` those of saved tracks. `counts` has
 the events and the tables computed from them, `clock` the start time of a video and the intervals of
-all tables and pages, and `output` the files of counts and flows.
+all tables and pages, and `output` the files of counts and flows. `survey` has the tables of the
+workbook, which `workbook` writes, and `measures` the peak hours and turning movements in them.
 """
