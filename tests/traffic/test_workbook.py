@@ -12,7 +12,7 @@ import pytest
 from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.traffic.clock import Clock
-from vdet.traffic.counts import Checked, Corrected, Counts, Event
+from vdet.traffic.counts import Corrected, Counts, Event
 from vdet.traffic.measures import movement
 from vdet.traffic.survey import Survey
 from vdet.traffic.workbook import Sheet, SheetTable, write_workbook
@@ -67,7 +67,7 @@ def morning() -> dict[str, Counts]:
         event(1010, "east", "out", 2, "truck"),
         event(3599, "south", "in", 3, "car"),
         warnings=("east: this line is shorter than a vehicle; make it longer",),
-        corrected=Corrected(2, ("fixes.yaml",), (Checked("north", 0, 600),)),
+        corrected=Corrected(2, ("fixes.yaml",)),
     )
     rest = counts(
         BEGIN + timedelta(hours=1),
@@ -227,10 +227,9 @@ def test_zones_vehicles_files_and_notes(book: Path) -> None:
         file first_frame last_frame observed,_s after_the_file_before clock events doubts
         07.jsonl 07:00:00 07:59:59 3599.96 -         from_its_name 7 1
         08.jsonl 08:00:00 08:10:00 600     continues from_its_name 2 1""")
-    assert sheets["Notes"][:4] == table("""
+    assert sheets["Notes"][:3] == table("""
         file note
         07.jsonl east:_this_line_is_shorter_than_a_vehicle;_make_it_longer
-        07.jsonl north:_checked_from_0:00_to_10:00;_after_corrections_1_event
         08.jsonl the_image_is_dark_[dark]""")
     assert sheets["Notes"][-1] == "- PCU:_truck_2.5;_others_1."
 

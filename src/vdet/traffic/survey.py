@@ -9,7 +9,7 @@ from itertools import groupby, product
 from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.config.shapes import NOWHERE
-from vdet.errors import ConfigError, clock_text, counted
+from vdet.errors import ConfigError, counted
 from vdet.traffic import counts as tables
 from vdet.traffic import measures
 from vdet.traffic.clock import ClockTime, Interval, Intervals
@@ -210,7 +210,7 @@ class Survey:
         rows: list[list[Cell]] = [
             [name, text]
             for name, counts in self._videos.items()
-            for text in (*counts.doubts, *counts.warnings, *_checks(counts))
+            for text in (*counts.doubts, *counts.warnings)
         ]
         units = [f"{name} {number:g}" for name, number in self._settings.traffic.pcu.items()]
         rows += [["", text] for text in _NOTES.splitlines()]
@@ -219,17 +219,6 @@ class Survey:
 
     def _intervals(self, length: int | None) -> Intervals:
         return Intervals([(counts.clock, counts.spans) for counts in self._counts], length)
-
-
-def _checks(counts: Counts) -> Iterator[str]:
-    """Yield a sentence for each part that a reviewer checked."""
-    for span in counts.corrected.checked if counts.corrected else ():
-        passed = sum(
-            event.name == span.line and span.start <= event.time < span.end
-            for event in counts.events
-        )
-        times = f"from {clock_text(span.start)} to {clock_text(span.end)}"
-        yield f"{span.line}: checked {times}; after corrections {counted(passed, 'event')}"
 
 
 def _time(value: ClockTime) -> Cell:
