@@ -111,7 +111,7 @@ def table(text: str) -> list[str]:
 
 
 def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> None:
-    empty = " -" * 10
+    empty = " -" * 12
     facts = f"""
         {FORMULA} - {empty}
         surveyor A._Smith {empty}
@@ -129,16 +129,16 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
         - - {empty}
         Volumes - {empty}
         line_or_zone direction all_vehicles per_hour car truck tractor heavy,_% PCU peak_hour
-            vehicles_in_it peak_hour_factor
-        north in        2 1.7 1 1 0 50  3.5 07:00:00 2 0.5
-        north out       1 0.9 1 0 0 0   1   -        - -
-        east  in        1 0.9 0 0 1 0   1   -        - -
-        east  out       1 0.9 0 1 0 100 2.5 07:00:00 1 0.25
-        south in        1 0.9 1 0 0 0   1   07:00:00 1 0.25
-        south out       1 0.9 1 0 0 0   1   07:00:00 1 0.25
-        box   enter     1 0.9 1 0 0 0   1   07:00:00 1 0.25
-        box   exit      1 0.9 1 0 0 0   1   07:00:00 1 0.25
-        all_flows -     4 3.4 2 1 1 25  5.5 07:00:00 3 0.75"""
+            vehicles_in_it peak_hour_factor median_km/h 85_%_km/h
+        north in        2 1.7 1 1 0 50  3.5 07:00:00 2 0.5 41.5 41.5
+        north out       1 0.9 1 0 0 0   1   -        - - - -
+        east  in        1 0.9 0 0 1 0   1   -        - - - -
+        east  out       1 0.9 0 1 0 100 2.5 07:00:00 1 0.25 - -
+        south in        1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        south out       1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        box   enter     1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        box   exit      1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        all_flows -     4 3.4 2 1 1 25  5.5 07:00:00 3 0.75 41.5 41.5"""
     assert lines_of(book)["Summary"] == table(facts)
 
 

@@ -22,7 +22,7 @@ Direction = tuple[str, str]
 
 _IN = ENTER, APPEAR
 
-Key = TypeVar("Key")
+Key = TypeVar("Key", bound=tuple[str | None, ...])
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,10 +277,7 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
         for index, video in enumerate(videos)
         for event in video.events
     )
-    return [
-        CountRow(period.start, period.end, name, direction, kind, count, *_flow(period, count))
-        for period, (name, direction), kind, count in _cells(intervals, counts, _directions(videos))
-    ]
+    return [CountRow(*values) for values in _rows(intervals, counts, _directions(videos))]
 
 
 def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
@@ -296,15 +293,7 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
         counts[intervals.number(index, first.time), flow, class_of(first)] += 1
     names: list[str | None] = [*flow_names(videos), None]
     flows = sorted({flow for _, flow, _ in counts}, key=lambda flow: list(map(names.index, flow)))
-    return [
-        FlowRow(period.start, period.end, origin, destination, kind, count, *_flow(period, count))
-        for period, (origin, destination), kind, count in _cells(intervals, counts, flows)
-    ]
-
-
-def _flow(period: Interval, count: int) -> tuple[float, bool, float | None]:
-    """Return the last values of a row: `observed`, `is_part` and `per_hour`."""
-    return period.observed, period.is_part, per_hour(count, period.observed)
+    return [FlowRow(*values) for values in _rows(intervals, counts, flows)]
 
 
 def per_hour(count: float, seconds: float) -> float | None:
@@ -413,13 +402,15 @@ def class_of(event: Event) -> str:
     return event.class_name or UNKNOWN
 
 
-def _cells(
+def _rows(
     intervals: Intervals, counts: Counter[tuple[int, Key, str]], keys: Iterable[Key]
-) -> Iterator[tuple[Interval, Key, str, int]]:
-    """Yield the count of each interval, direction or flow, and class that occurs, even if it is 0.
+) -> Iterator[tuple[Any, ...]]:
+    """Yield the values of each interval, direction or flow, and class that occurs, even if it is 0.
 
     The keys of `counts` are the number of the interval, the direction or flow, and the class.
     """
     classes = sorted({kind for _, _, kind in counts}) or [UNKNOWN]
     for period, key, kind in product(intervals.periods, keys, classes):
-        yield period, key, kind, counts[period.number, key, kind]
+        count = counts[period.number, key, kind]
+        flow = period.observed, period.is_part, per_hour(count, period.observed)
+        yield period.start, period.end, *key, kind, count, *flow

@@ -6,6 +6,8 @@ from contextlib import suppress
 from datetime import datetime, timedelta
 from itertools import groupby, product
 
+import numpy as np
+
 from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.config.shapes import NOWHERE
@@ -50,6 +52,8 @@ class Survey:
         self._counts, self._length = list(videos.values()), settings.traffic.seconds
         self._classes = tables.class_columns(self._counts)
         self._whole = self._intervals(None).periods[0]
+        events = (event for counts in self._counts for event in counts.events)
+        self._has_speeds = any(event.speed is not None for event in events)
 
     def sheets(self, picture: Image | None = None) -> list[Sheet]:
         """Return the sheets of the workbook; `picture` is the scene, as for `Sheet`."""
@@ -106,7 +110,8 @@ class Survey:
         flows = tables.vehicle_flows(self._counts)
         groups["all flows", ""] = [(index, first) for index, first, _ in flows]
         headings = "line or zone", "direction", *self._headings
-        peak = "peak hour", "vehicles in it", "peak hour factor"
+        peak = ["peak hour", "vehicles in it", "peak hour factor"]
+        peak += ["median km/h", "85 % km/h"] if self._has_speeds else []
         rows = [[*pair, *self._volume(events, quarters)] for pair, events in groups.items()]
         return SheetTable([*headings, *peak], rows, "Volumes")
 
@@ -118,7 +123,12 @@ class Survey:
         if quarters:
             by_quarter = Counter(quarters.number(index, event.time) for index, event in events)
             peak = measures.peak_hour(quarters.periods, by_quarter)
-        return [*cells, *((_time(peak.start), peak.vehicles, peak.factor) if peak else [None] * 3)]
+        cells += (_time(peak.start), peak.vehicles, peak.factor) if peak else [None] * 3
+        speeds = [event.speed for _, event in events if event.speed is not None]
+        if self._has_speeds:
+            quantiles = np.quantile(speeds, [0.5, 0.85]).round(1).tolist() if speeds else [None] * 2
+            cells += quantiles
+        return cells
 
     def _by_class(self, names: tuple[str, str], rows: Sequence[CountRow | FlowRow]) -> SheetTable:
         """Return a table with a column for each class, from rows with one class."""
