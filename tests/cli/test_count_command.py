@@ -132,6 +132,9 @@ def test_a_workbook_and_a_page_show_all_files_on_a_picture(
     assert text.count("data:image/jpeg") == 1
     assert "<title>&lt;b&gt;Elm Street</title>" in text
     assert "gap of 598 s" in text
+    scene.write_bytes(encode_image(np.zeros((240, 240, 3), np.uint8), scene))
+    result = run("count", *tracks, *lines, "--flows", tmp_path / "f.xlsx", code=1)
+    assert "scene.png: camera.size: points are for frames of 320×240, whose aspect" in result.err
     scene.unlink()
     result = run("count", *tracks, *lines, "--flows", tmp_path / "f.xlsx", code=1)
     assert "scene.png: cannot be read: No such file" in result.err

@@ -32,11 +32,12 @@ def result_digest(run: Run) -> str:
     """Return a digest of everything that the outputs of a run depend on.
 
     This is the program, the model, the settings, the part, the time zone of this computer, and the
-    name, size and time of the input, of all numbered images, and of the masks.
+    name, size and time of the input, of all numbered images, and of the masks and the picture of a survey.
     """
     settings = run.settings
-    masks = (Path(region.mask) for region in settings.regions if region.mask)
-    files = filter(Path.exists, (*(numbered_images(run.source) or [run.source]), *masks))
+    shown = (*(region.mask for region in settings.regions), settings.survey.picture)
+    images = (Path(name) for name in shown if name)
+    files = filter(Path.exists, (*(numbered_images(run.source) or [run.source]), *images))
     parts = (
         *(f"vdet {__version__}", run.start, run.end, run.frames, time.timezone, time.tzname),
         _sha256(model_file(settings.detector)),

@@ -1,7 +1,6 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -79,7 +78,7 @@ def count(
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
-    from vdet.media.images import read_image
+    from vdet.pages.traffic import survey_image
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.corrections import read_corrections
     from vdet.traffic.counting import count_files
@@ -87,8 +86,7 @@ def count(
     inputs = source.inputs(*tracks, *corrections, settings=settings)
     files = OutputFiles(overwrite=overwrite, inputs=inputs)
     check_sinks(outputs, files)
-    reviews, picture = read_corrections(corrections), settings.survey.picture
-    scene = read_image(Path(picture)) if picture else None
+    reviews, scene = read_corrections(corrections), survey_image(settings)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         videos = count_files(tracks, settings, size, rate, corrections=reviews, advance=advance)

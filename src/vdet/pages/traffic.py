@@ -7,14 +7,18 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
 from vdet.boxes import Image
+from vdet.config.schema import Settings
 from vdet.config.shapes import TrafficSettings
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
+from vdet.errors import ConfigError
+from vdet.media.images import read_image
 from vdet.pages.render import Table
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
@@ -155,6 +159,26 @@ def with_marks(image: Image, marks: Iterable[Mark]) -> Image:
     drawn = image.copy()
     draw_marks(drawn, marks)
     return drawn
+
+
+def survey_image(settings: Settings) -> Image | None:
+    """Return the image `survey.picture`, if there is one.
+
+    Raises
+    ------
+    ImageError
+        It cannot be read.
+    ConfigError
+        The lines and zones are for frames of another aspect ratio.
+    """
+    if not settings.survey.picture:
+        return None
+    image = read_image(Path(settings.survey.picture))
+    try:
+        settings.traffic.for_frames(image.shape[1], image.shape[0])
+    except ConfigError as error:
+        raise ConfigError(f"{settings.survey.picture}: {error}") from error
+    return image
 
 
 def scene_picture(

@@ -24,8 +24,7 @@ from vdet.labels.formats import (
 from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.media import Picture
-from vdet.media.images import read_image
-from vdet.pages.traffic import scene_picture
+from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output
@@ -210,8 +209,7 @@ class WorkbookSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        picture = context.settings.survey.picture
-        self._image = read_image(Path(picture)) if picture else None
+        self._image = survey_image(context.settings)
         self._fullest: Picture | None = None
         self._most = -1
 
