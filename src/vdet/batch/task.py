@@ -32,7 +32,7 @@ def result_digest(run: Run) -> str:
     """Return a digest of everything that the outputs of a run depend on.
 
     This is the program, the model, the settings, the part, the time zone of this computer, and the
-    name, size and time of the input, of all numbered images, and of the masks and the picture of a survey.
+    name, size and time of the input, of all numbered images, of the masks and of the picture.
     """
     settings = run.settings
     shown = (*(region.mask for region in settings.regions), settings.survey.picture)
