@@ -49,10 +49,17 @@ class Road:
     settings: Path
 
 
-def draw_road(folder: Path, cars: list[Car], *, missed: int | None = None, seconds: int) -> Road:
+def draw_road(
+    folder: Path,
+    cars: list[Car],
+    *,
+    missed: int | None = None,
+    seconds: int,
+    settings: str = GATE,
+) -> Road:
     """Draw cars; the tracks lack the one with the number `missed`."""
     road = Road(folder / "in.mp4", folder / "tracks.txt", folder / "gate.yaml")
-    road.settings.write_text(GATE)
+    road.settings.write_text(settings)
     rows = []
     with av.open(str(road.video), "w") as container:
         stream = container.add_stream("libx264", rate=Fraction(RATE), options={"crf": "10"})
@@ -82,10 +89,14 @@ def write_review(run: Run, folder: Path, road: Road) -> Path:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Page:
-    """What a page holds: the values of its script, and its pictures by minute, BGR."""
+    """What a page holds: the values of its script, and its pictures, BGR.
+
+    `pictures` are those of the strip by minute, `crops` those of vehicles by id.
+    """
 
     data: dict[str, Any]
     pictures: dict[int, NDArray[np.uint8]]
+    crops: dict[int, NDArray[np.uint8]]
 
     def streaks(self, minute: int) -> list[tuple[float, float]]:
         """Return seconds and place of the middle of each red streak, in order of time."""
@@ -106,8 +117,13 @@ def read_page(path: Path) -> Page:
     text = path.read_text("utf-8")
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
     assert found
-    pictures = {
-        int(minute): cv2.imdecode(np.frombuffer(b64decode(data), np.uint8), cv2.IMREAD_COLOR)
-        for minute, data in re.findall(r'id="strip-0-(\d+)">([^<]*)<', text)
-    }
-    return Page(json.loads(found[1]), {key: np.asarray(p, np.uint8) for key, p in pictures.items()})
+    pictures, crops = (
+        {int(number): _picture(data) for number, data in re.findall(f'id="{name}">([^<]*)<', text)}
+        for name in (r"strip-0-(\d+)", r"crop-(\d+)")
+    )
+    return Page(json.loads(found[1]), pictures, crops)
+
+
+def _picture(data: str) -> NDArray[np.uint8]:
+    decoded = cv2.imdecode(np.frombuffer(b64decode(data), np.uint8), cv2.IMREAD_COLOR)
+    return np.asarray(decoded, np.uint8)

@@ -103,6 +103,17 @@ def test_the_saved_file_corrects_the_counts_and_is_their_truth(
     assert result.out.splitlines()[-1].split()[3:8] == ["2", "2", "1", "1", "0"]
 
 
+def test_the_class_and_the_direction_of_a_mark_may_both_be_wrong(window: Browser) -> None:
+    window.type(TAB, "3", "d")
+    assert window.run("return document.querySelector('#details img').naturalWidth") == 28
+    false, missed = saved(window)["events"]
+    assert false == {**false, "error": "false", "direction": "away"}
+    assert missed["class"] == window.run("return data.classes[2]")
+    assert (missed["error"], missed["direction"], missed.get("id")) == ("missed", "here", None)
+    window.type("x")
+    assert [event["error"] for event in saved(window)["events"]] == ["false"]
+
+
 def test_undo_and_reload_keep_what_was_checked(window: Browser) -> None:
     window.type(TAB, "x")
     click_at(window, 8, 0.29)

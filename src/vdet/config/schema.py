@@ -169,7 +169,7 @@ class InputSettings(Section):
 
 
 class OutputSettings(Section):
-    """The output video, in H.264."""
+    """The output video, in H.264, and the pictures of `--crops`, `--page` and `--review`."""
 
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow"] = (
         "superfast"
@@ -177,6 +177,10 @@ class OutputSettings(Section):
     """Speed of the encoder. Slower presets write smaller files."""
     crf: int = Field(25, ge=0, le=51)
     """Quality: 0 is the best, 51 the worst."""
+    coarse: bool = False
+    """Reduce these pictures until vehicles are about 40 pixels across, so that no face or number
+    plate is readable. Videos stay as they are.
+    """
 
 
 class ClipSettings(Section):

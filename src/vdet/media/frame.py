@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float64Array, Image
+from vdet.boxes import Box, Float64Array, Image
 from vdet.media.images import Orientation, from_16_bits, to_ycrcb
 
 if TYPE_CHECKING:  # an image needs no PyAV
@@ -230,6 +230,17 @@ class Picture:
     def copy(self, used: Planes | None = None) -> Image | Planes:
         """Return a copy of the pixels that may be changed: see `Planes.copy`."""
         return self.planes.copy(used) if self.planes else self.image.copy()
+
+    def cut(self, box: Box) -> Image:
+        """Return a copy of the part in a box, BGR; of planes, only that part is converted."""
+        if not self.planes:
+            return box.cut(self.image).copy()
+        x1, y1, x2, y2 = (max(0, side) for side in box.pixels)
+        luma, *chroma = self.planes.layers
+        left, top = x1 // 2, y1 // 2
+        blue, red = (layer[top : (y2 + 1) // 2, left : (x2 + 1) // 2] for layer in chroma)
+        whole = self.planes.coding.to_bgr((luma[2 * top : y2, 2 * left : x2], blue, red))
+        return whole[y1 - 2 * top :, x1 - 2 * left :]
 
     @cached_property
     def image(self) -> Image:

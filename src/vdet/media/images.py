@@ -41,6 +41,8 @@ _TOO_LARGE = (
 _12_BITS, _16_BITS = 4095, 65_535
 """The values of white."""
 _ALL_BITS = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+_COARSE_SIDE = 40
+"""Pixels across a vehicle at which no face or plate is readable."""
 _JPEG_SCAN, _JPEG_END = b"\xff\xda", b"\xff\xd9"  # markers, ITU-T T.81, annex B
 _ORIENTATION = 274  # EXIF tag
 
@@ -158,6 +160,23 @@ def encode_image(image: Image, path: Path) -> bytes:
         if written:
             return data.tobytes()
     raise ImageError(f"{path}: images must end in {', '.join(sorted(IMAGE_SUFFIXES))}")
+
+
+def shrunk(image: Image, scale: float) -> Image:
+    """Return an image `scale` times as large; from 1 on, the image itself."""
+    if scale >= 1:
+        return image
+    height, width = (max(1, round(side * scale)) for side in image.shape[:2])
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def coarse_scale(vehicle: float, side: float) -> float:
+    """Return the scale at which no face or plate of a picture is readable: see `output.coarse`.
+
+    `vehicle` is the size of its largest vehicle, and `side` that of the picture, pixels. A vehicle
+    that was not detected may be larger, up to a quarter of the picture.
+    """
+    return _COARSE_SIDE / max(vehicle, side / 4)
 
 
 def from_16_bits(values: npt.NDArray[np.uint16]) -> Image:

@@ -8,10 +8,10 @@ from typing import Any
 from urllib.parse import quote
 
 import cv2
-import numpy as np
 
 from vdet.boxes import Image
 from vdet.errors import counted, escaped
+from vdet.media.images import shrunk
 from vdet.pages.charts import hex_color, time_text
 from vdet.version import __version__
 
@@ -41,10 +41,8 @@ def render(template: str, **values: Any) -> str:
 
 def jpeg_uri(image: Image, max_side: int | None = None) -> str:
     """Return a BGR uint8 image as a data URI; its longer side has at most `max_side` pixels."""
-    if max_side and (scale := max_side / max(image.shape[:2])) < 1:
-        height, width = (max(1, round(side * scale)) for side in image.shape[:2])
-        shrunk = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-        image = np.asarray(shrunk, np.uint8)
+    if max_side:
+        image = shrunk(image, max_side / max(image.shape[:2]))
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
 

@@ -1,8 +1,10 @@
 """The page on which counts are checked: strips with marks, all in one file."""
 
-from collections.abc import Iterable, Sequence
+from base64 import b64encode
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any, TextIO
 from zlib import crc32
 
@@ -17,7 +19,7 @@ from vdet.traffic.estimate import draw_minutes, strata_of
 from vdet.traffic.strips import Band
 
 PAGE_NAME = "review.html"
-_PLACE = "<!-- pictures -->"
+_PICTURES = "<!-- pictures -->"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +43,33 @@ class StripPicture:
     height: int
     is_upward: bool
 
+    @property
+    def name(self) -> str:
+        """Name of the picture in the page."""
+        return f"strip-{self.band}-{self.minute}"
+
+
+def crop_name(track: int) -> str:
+    """Return the name in the page of the best picture of a vehicle."""
+    return f"crop-{track}"
+
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A counted crossing: number of the band, seconds from the first frame, place from 0 to 1."""
+    """A counted event: number of the band, seconds from the first frame, position from 0 to 1.
 
-    band: int
+    A vehicle that appears or vanishes inside a zone is in no band.
+    """
+
+    band: int | None
     seconds: float
-    place: float
+    position: float
     event: Event
+
+    @property
+    def minute(self) -> int:
+        """Number from 0."""
+        return int(self.seconds // 60)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +86,16 @@ class Review:
         """Return the values for the script of the page."""
         video = self.video
         shapes = self.traffic.for_frames(video.width, video.height)
-        keep = {"name", "start", "end", "left", "right", "points"}
+        fields = {"name", "start", "end", "left", "right", "points"}
         lines, zones = (
-            [shape.model_dump(mode="json", include=keep) for shape in listed]
+            [shape.model_dump(mode="json", include=fields) for shape in listed]
             for listed in (shapes.lines, shapes.zones)
         )
         marks = [
             {
                 "band": mark.band,
                 "seconds": mark.seconds,
-                "place": mark.place,
+                "position": mark.position,
                 "line": mark.event.name,
                 "time": mark.event.time,
                 "direction": mark.event.direction,
@@ -84,18 +104,18 @@ class Review:
             }
             for mark in self.marks
         ]
-        others = {class_of(mark.event) for mark in self.marks} - set(OUR_NAMES)
+        unlisted = {class_of(mark.event) for mark in self.marks} - set(OUR_NAMES)
         return {
             "video": video.path.name,
             "size": [video.width, video.height],
             "start": float(video.start),
-            "made": datetime.now(UTC).isoformat(timespec="seconds"),
+            "written": datetime.now(UTC).isoformat(timespec="seconds"),
             "lines": lines,
             "zones": zones,
             "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],
             "pictures": [asdict(picture) for picture in self.pictures],
             "marks": marks,
-            "classes": [*OUR_NAMES, *sorted(others)],
+            "classes": [*OUR_NAMES, *sorted(unlisted)],
             **self._sampling(),
         }
 
@@ -104,30 +124,36 @@ class Review:
 
         The seed follows from the name of the video, so nobody can draw until it looks good.
         """
-        minutes = sorted({picture.minute for picture in self.pictures})
+        minutes = sorted(
+            {picture.minute for picture in self.pictures} | {mark.minute for mark in self.marks}
+        )
         counted = {class_of(mark.event): [0] * len(minutes) for mark in self.marks}
         for mark in self.marks:
-            counted[class_of(mark.event)][minutes.index(int(mark.seconds // 60))] += 1
+            counted[class_of(mark.event)][minutes.index(mark.minute)] += 1
         traffic = [sum(numbers) for numbers in zip(*counted.values(), strict=True)]
         traffic = traffic or [0] * len(minutes)
         seed = crc32(self.video.path.name.encode("utf-8", "surrogateescape"))
         order = [minutes[index] for index in draw_minutes(traffic, seed)] if minutes else []
         strata = strata_of(traffic).tolist() if minutes else []
-        return {"counted": counted, "strata": strata, "order": order, "seed": seed}
+        return {
+            "minutes": minutes,
+            "counted": counted,
+            "strata": strata,
+            "order": order,
+            "seed": seed,
+        }
 
 
-def write_picture(file: TextIO, picture: StripPicture, data: str) -> None:
-    """Write the part of the page that holds a picture; `data` is WebP in base 64."""
-    name = f"strip-{picture.band}-{picture.minute}"
-    file.write(f'<script type="text/plain" id="{name}">{data}</script>\n')
-
-
-def write_review(file: TextIO, review: Review, pictures: Iterable[str]) -> None:
-    """Write the page; `pictures` are the lines of `write_picture`, passed on one by one."""
+def write_review(file: TextIO, review: Review, folder: Path) -> None:
+    """Write the page. `folder` has its pictures, WebP files; a vehicle may have none."""
     names = "review.js", "estimate.js"
     script = Markup("".join((TEMPLATES / name).read_text("utf-8") for name in names))
     page = render("review.html", data=review.data(), script=script, name=review.video.path.name)
-    before, _, after = page.partition(_PLACE)
+    before, _, after = page.partition(_PICTURES)
     file.write(before)
-    file.writelines(pictures)
+    crops = {crop_name(mark.event.id) for mark in review.marks}
+    for path in (folder / name for name in (*(p.name for p in review.pictures), *sorted(crops))):
+        if path.exists():
+            data = b64encode(path.read_bytes()).decode("ascii")
+            file.write(f'<script type="text/plain" id="{path.name}">{data}</script>\n')
     file.write(after)

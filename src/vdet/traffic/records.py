@@ -11,6 +11,7 @@ import numpy as np
 
 from vdet.boxes import Box, Image
 from vdet.media import Picture
+from vdet.media.images import coarse_scale, shrunk
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
@@ -310,10 +311,11 @@ class BestCrops:
     """Finds the best image of each vehicle, frame by frame.
 
     Only images of vehicles in the last frame are kept in memory. The others are returned, so memory
-    does not grow with the length of the video.
+    does not grow with the length of the video. `is_coarse` is `output.coarse`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_coarse: bool = False) -> None:
+        self._is_coarse = is_coarse
         self._best: dict[int, Crop] = {}
         self._merits: dict[int, _Merit] = {}
 
@@ -331,12 +333,19 @@ class BestCrops:
             merit = _merit(track, picture)
             if merit and merit > self._merits.get(track.id, (False, 0.0)):
                 self._merits[track.id] = merit
-                self._best[track.id] = Crop(track.id, frame.time, _cut(track.box, picture))
+                self._best[track.id] = Crop(track.id, frame.time, self._cut(track.box, picture))
         return gone
 
     def end(self) -> list[Crop]:
         """Return the images of the vehicles that the last frame shows."""
         return [crop for _, crop in sorted(self._best.items())]
+
+    def _cut(self, box: Box, picture: Picture) -> Image:
+        box = box.rounded
+        x, y = (round(side * _PADDING) for side in (box.width, box.height))
+        image = picture.cut(Box(box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y))
+        side = max(box.width, box.height)
+        return shrunk(image, coarse_scale(side, side)) if self._is_coarse else image
 
 
 def _merit(track: Track, picture: Picture) -> _Merit | None:
@@ -347,9 +356,3 @@ def _merit(track: Track, picture: Picture) -> _Merit | None:
     inside = box.x2 < picture.width and box.y2 < picture.height
     is_whole = inside and min(box.x1, box.y1) > 0
     return is_whole, box.area * track.score
-
-
-def _cut(box: Box, picture: Picture) -> Image:
-    box = box.rounded
-    x, y = (round(side * _PADDING) for side in (box.width, box.height))
-    return Box(box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y).cut(picture.image).copy()

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from vdet.boxes import Float64Array, Image
 from vdet.media import Picture
 from vdet.polygons import Point, meeting
-from vdet.track.track import FrameTracks
+from vdet.track.track import FrameTracks, Track
 from vdet.traffic.crossings import Border, Line
 
 _SAMPLES = 200, 260
@@ -84,12 +84,15 @@ class Passage:
         Fraction of the length of the band, 0 to 1.
     velocity
         Movement of the foot, x and y, pixels a frame.
+    width
+        Of its box, pixels.
     """
 
     id: int
     time: float
     place: float
     velocity: Point
+    width: float
 
 
 class Passages:
@@ -116,16 +119,17 @@ class Passages:
             while frame.time - feet[0][1] > _HISTORY:
                 feet.popleft()
             if len(feet) > 1:
-                self._pass(track.id, frame.time, feet)
+                self._pass(track, frame.time, feet)
 
-    def _pass(self, key: int, time: float, feet: Sequence[tuple[int, float, Point]]) -> None:
+    def _pass(self, track: Track, time: float, feet: Sequence[tuple[int, float, Point]]) -> None:
         (first, _, oldest), (_, before, a), (last, _, b) = feet[0], feet[-2], feet[-1]
         for band, found in zip(self._bands, self.found, strict=True):
             way = meeting((a, b), (band.start, band.end))
             if way is not None:
                 place = meeting((band.start, band.end), (a, b)) or 0.0
                 x, y = ((new - old) / (last - first) for new, old in zip(b, oldest, strict=True))
-                found.append(Passage(key, before + way * (time - before), place, (x, y)))
+                moment = before + way * (time - before)
+                found.append(Passage(track.id, moment, place, (x, y), track.box.width))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

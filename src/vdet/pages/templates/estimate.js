@@ -13,22 +13,22 @@ function studentQuantile(n, z) {
   return z + (z ** 3 + z) / 4 / n + second / n ** 2 + (3 * z ** 7 + 19 * z ** 5 + 17 * z ** 3 - 15 * z) / 384 / n ** 3;
 }
 
-/** Estimate the errors of one kind in unchecked minutes from those found in each minute. */
-function uncheckedErrors({ found, size, strata, sample, rest, limit }) {
+/** Estimate the errors of one kind in unchecked minutes from their number in each minute. */
+function uncheckedErrors({ errors, size, strata, sample, unchecked, limit }) {
   const sum = (minutes, value) => minutes.reduce((total, minute) => total + value(minute), 0);
-  const inStratum = (minutes, minute) => minutes.filter(other => strata[other] === strata[minute]).length;
-  const weights = new Map(sample.map(minute => [minute, 1 + inStratum(rest, minute) / inStratum(sample, minute)]));
-  const others = sum(rest, minute => size[minute]), weighted = sum(sample, minute => weights.get(minute) * size[minute]);
+  const inStratum = (minutes, minute) => minutes.filter(item => strata[item] === strata[minute]).length;
+  const weights = new Map(sample.map(minute => [minute, 1 + inStratum(unchecked, minute) / inStratum(sample, minute)]));
+  const traffic = sum(unchecked, minute => size[minute]), weighted = sum(sample, minute => weights.get(minute) * size[minute]);
   if (weighted === 0) return { number: 0, single: 0, scatter: 0, weight: limit, limit };
-  const weight = minute => weights.get(minute) * others / weighted;
+  const weight = minute => weights.get(minute) * traffic / weighted;
   const variance = minute => weight(minute) * (weight(minute) + 1);
-  const number = sum(sample, minute => weight(minute) * found[minute]);
-  const left = minute => others && found[minute] - number / others * size[minute];
+  const number = sum(sample, minute => weight(minute) * errors[minute]);
+  const residual = minute => traffic && errors[minute] - number / traffic * size[minute];
   return {
     number, limit,
-    single: sum(sample, minute => variance(minute) * found[minute]) * Math.max(0, 1 - number / (limit || 1)),
-    scatter: sum(sample, minute => variance(minute) * left(minute) ** 2) * sample.length / (sample.length - 1),
-    weight: others / sum(sample, minute => size[minute]),
+    single: sum(sample, minute => variance(minute) * errors[minute]) * Math.max(0, 1 - number / (limit || 1)),
+    scatter: sum(sample, minute => variance(minute) * residual(minute) ** 2) * sample.length / (sample.length - 1),
+    weight: traffic / sum(sample, minute => size[minute]),
   };
 }
 
@@ -44,8 +44,8 @@ function errorBounds(errors, n, unchecked, spread) {
 }
 
 /** Return the parts of the interval below and above the estimate after more minutes. */
-function intervalWidths(gains, losses, sample, rest, more) {
-  const n = sample + more, unchecked = 1 - more / rest, spread = unchecked * sample / n;
+function intervalWidths(gains, losses, sample, left, more) {
+  const n = sample + more, unchecked = 1 - more / left, spread = unchecked * sample / n;
   const [low, high] = errorBounds(gains, n, unchecked, spread);
   const [least, most] = errorBounds(losses, n, unchecked, spread);
   const gained = gains.number * unchecked, lost = losses.number * unchecked;
@@ -60,31 +60,31 @@ function intervalWidths(gains, losses, sample, rest, more) {
  * are left and fewer than 3 drawn ones are checked.
  */
 function estimateCounts({ counted, strata, errors, checked, drawn }) {
-  const minutes = strata.map((_, minute) => minute), rest = minutes.filter(minute => !checked.has(minute));
+  const minutes = strata.map((_, minute) => minute), unchecked = minutes.filter(minute => !checked.has(minute));
   const sample = minutes.filter(minute => checked.has(minute) && drawn.has(minute));
-  if (rest.length > 0 && sample.length < 3) return [];
+  if (unchecked.length > 0 && sample.length < 3) return [];
   const traffic = minutes.map(minute => Object.values(counted).reduce((sum, numbers) => sum + numbers[minute], 0));
   const classes = new Set([...Object.keys(counted), ...errors.map(error => error.true).filter(name => name !== null)]);
   return [null, ...[...classes].sort()].map(group => {
-    const own = group === null ? traffic : counted[group] ?? minutes.map(() => 0);
+    const number = group === null ? traffic : counted[group] ?? minutes.map(() => 0);
     const isIn = name => name !== null && (group === null || group === name);
-    const foundIn = test => {
+    const errorsIn = test => {
       const numbers = minutes.map(() => 0);
       errors.filter(test).forEach(error => numbers[error.minute]++);
       return numbers;
     };
-    const added = foundIn(error => isIn(error.true) && !isIn(error.counted));
-    const removed = foundIn(error => isIn(error.counted) && !isIn(error.true));
+    const added = errorsIn(error => isIn(error.true) && !isIn(error.counted));
+    const removed = errorsIn(error => isIn(error.counted) && !isIn(error.true));
     const sum = numbers => numbers.reduce((total, number) => total + number, 0);
-    const known = sum(own) + sum(added) - sum(removed), total = { group, counted: sum(own) };
-    if (rest.length === 0) return { ...total, true: known, low: known, high: known, more: 0 };
-    const size = traffic.map(number => number + 1), limit = sum(rest.map(minute => own[minute]));
-    const gains = uncheckedErrors({ found: added, size, strata, sample, rest, limit: Infinity });
-    const losses = uncheckedErrors({ found: removed, size: own, strata, sample, rest, limit });
-    const value = known + gains.number - losses.number;
-    const [below, above] = intervalWidths(gains, losses, sample.length, rest.length, 0);
+    const corrected = sum(number) + sum(added) - sum(removed), total = { group, counted: sum(number) };
+    if (unchecked.length === 0) return { ...total, true: corrected, low: corrected, high: corrected, more: 0 };
+    const size = traffic.map(vehicles => vehicles + 1), limit = sum(unchecked.map(minute => number[minute]));
+    const gains = uncheckedErrors({ errors: added, size, strata, sample, unchecked, limit: Infinity });
+    const losses = uncheckedErrors({ errors: removed, size: number, strata, sample, unchecked, limit });
+    const value = corrected + gains.number - losses.number;
+    const [below, above] = intervalWidths(gains, losses, sample.length, unchecked.length, 0);
     let more = 0;
-    while (more < rest.length && sum(intervalWidths(gains, losses, sample.length, rest.length, more)) > 0.04 * value) more++;
+    while (more < unchecked.length && sum(intervalWidths(gains, losses, sample.length, unchecked.length, more)) > 0.04 * value) more++;
     return { ...total, true: value, low: value - below, high: value + above, more };
   });
 }

@@ -1,15 +1,15 @@
 "use strict";
-// The page of `vdet review`. A mark is a counted crossing, or a vehicle that was missed. What a person changes is the state:
-// edits of marks by their number, added marks, and the checked minutes. Seconds count from the first frame of the video.
+// The page of `vdet review`. A mark is a counted crossing, or a vehicle that was missed. Its fixes say what is wrong with it:
+// false or missed (with null), class or direction (with what is correct). What a person changes is the state: the fixes of
+// counted marks by their key, missed vehicles, and the checked minutes. Seconds count from the first frame of the video.
 const MINUTE = 60;
 const data = JSON.parse(document.getElementById("data").textContent);
 const get = id => document.getElementById(id);
-const key = `vdet review ${data.video} ${data.made}`;
-const minutes = [...new Set(data.pictures.map(picture => picture.minute))].sort((a, b) => a - b);
+const key = `vdet review ${data.video} ${data.written}`;
 const minuteOf = mark => Math.floor(mark.seconds / MINUTE);
-let state = { edits: {}, added: [], checked: [], reviewer: "", sample: null };
+let state = { fixes: {}, missed: [], checked: [], reviewer: "", sample: null };
 let undone = []; // earlier states, as JSON
-let minute = minutes[0] ?? 0, selected = null, lastClass = mostFrequent(data.marks.map(mark => mark.class)) ?? data.classes[0];
+let minute = data.minutes[0] ?? 0, selected = null, lastClass = mostFrequent(data.marks.map(mark => mark.class)) ?? data.classes[0];
 
 function mostFrequent(values) {
   const counts = new Map();
@@ -18,15 +18,16 @@ function mostFrequent(values) {
 }
 
 // ---------------------------------------------------------------- marks and what a person says of them
-/** Return all marks with what a person says: `error` is null, false, missed, class or direction. */
+/** Return all marks with their fixes. */
 function allMarks() {
-  const counted = data.marks.map((mark, number) => ({ ...mark, key: `c${number}`, error: null, ...state.edits[`c${number}`] }));
-  return [...counted, ...state.added.map((mark, number) => ({ ...mark, key: `a${number}`, error: "missed" }))];
+  const counted = data.marks.map((mark, number) => ({ ...mark, key: `c${number}`, fixes: state.fixes[`c${number}`] ?? {} }));
+  return [...counted, ...state.missed.map((mark, number) => ({ ...mark, key: `m${number}`, number, fixes: { missed: null } }))];
 }
 
-const directionsOf = mark => data.bands[mark.band].directions;
-const otherDirection = (mark, direction) => directionsOf(mark).find(name => name !== direction);
-const find = name => allMarks().find(mark => mark.key === name);
+const isMissed = mark => "missed" in mark.fixes;
+const classOf = mark => mark.fixes.class ?? mark.class;
+const directionOf = mark => mark.fixes.direction ?? mark.direction;
+const selectedMark = () => allMarks().find(mark => mark.key === selected);
 
 /** Change the state by a function, so that it can be undone and survives a reload. */
 function change(edit) {
@@ -36,64 +37,61 @@ function change(edit) {
   refresh();
 }
 
-function editMark(name, values) {
-  const [kind, number] = [name[0], Number(name.slice(1))];
+function toggleFalse() {
+  const mark = selectedMark();
+  if (!mark) return;
+  if (isMissed(mark)) selected = null;
   change(() => {
-    if (kind === "a") Object.assign(state.added[number], values);
-    else if (values === null) delete state.edits[name];
-    else state.edits[name] = { ...state.edits[name], ...values };
+    if (isMissed(mark)) state.missed.splice(mark.number, 1);
+    else state.fixes[mark.key] = "false" in mark.fixes ? {} : { false: null };
   });
 }
 
-function toggleFalse() {
-  const mark = find(selected);
+/** Correct the class or the direction of the selected mark. */
+function correct(name, value) {
+  const mark = selectedMark();
   if (!mark) return;
-  if (mark.error === "missed") {
-    const number = Number(selected.slice(1));
-    selected = null;
-    change(() => state.added.splice(number, 1));
-  } else editMark(selected, mark.error === "false" ? null : { error: "false", correct: undefined });
+  const { false: _, ...fixes } = { ...mark.fixes, [name]: value };
+  if (value === mark[name]) delete fixes[name];
+  change(() => {
+    if (isMissed(mark)) state.missed[mark.number][name] = value;
+    else state.fixes[mark.key] = fixes;
+  });
 }
 
 function setClass(name) {
-  const mark = find(selected);
-  if (!mark) return;
   lastClass = name;
-  if (mark.error === "missed") editMark(selected, { class: name });
-  else editMark(selected, name === mark.class ? null : { error: "class", correct: name });
+  correct("class", name);
 }
 
 function turn() {
-  const mark = find(selected);
-  if (!mark) return;
-  if (mark.error === "missed") editMark(selected, { direction: otherDirection(mark, mark.direction) });
-  else if (mark.error === "direction") editMark(selected, null);
-  else editMark(selected, { error: "direction", correct: otherDirection(mark, mark.direction) });
+  const mark = selectedMark(), opposite = mark && data.bands[mark.band]?.directions.find(name => name !== directionOf(mark));
+  if (opposite) correct("direction", opposite);
 }
 
 /** Add a vehicle that was missed; its direction is that of the nearest marks at the line. */
-function addMissed(band, seconds, place) {
+function addMissed(band, seconds, position) {
   const near = data.marks.filter(mark => mark.band === band)
-    .sort((a, b) => Math.abs(a.place - place) - Math.abs(b.place - place)).slice(0, 5);
+    .sort((a, b) => Math.abs(a.position - position) - Math.abs(b.position - position)).slice(0, 5);
   const direction = mostFrequent(near.map(mark => mark.direction)) ?? data.bands[band].directions[0];
-  selected = `a${state.added.length}`;
+  selected = `m${state.missed.length}`;
   const rounded = Math.round(1000 * seconds) / 1000;
-  change(() => state.added.push({ band, seconds: rounded, place, line: data.bands[band].name,
+  change(() => state.missed.push({ band, seconds: rounded, position, line: data.bands[band].name,
     time: Math.round(1000 * (seconds + data.start)) / 1000, direction, class: lastClass }));
 }
 
 function undo() {
   if (!undone.length) return;
   state = JSON.parse(undone.pop());
-  if (selected && !find(selected)) selected = null;
+  if (!selectedMark()) selected = null;
   refresh();
 }
 
 /** Return the minutes to check: all, or those of the sample in the order in which they were drawn. */
-const planned = () => state.sample?.minutes ?? minutes;
+const planned = () => state.sample?.minutes ?? data.minutes;
 
 function draw() {
-  const count = Math.min(minutes.length, Number(get("count").value));
+  const count = Math.min(data.minutes.length, Number(get("count").value));
   change(() => { state.sample = count >= 1 ? { seed: data.seed, minutes: data.order.slice(0, count) } : null; });
   if (!planned().includes(minute)) [minute, selected] = [planned()[0], null];
   refresh();
@@ -112,22 +110,24 @@ function go(steps, isChecked) {
 const clock = seconds => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(0).padStart(2, "0")}`;
 
 function element(tag, className, text) {
-  const made = document.createElement(tag);
-  if (className) made.className = className;
-  if (text !== undefined) made.textContent = text;
-  return made;
+  const node = document.createElement(tag);
+  if (className) node.className = className;
+  if (text !== undefined) node.textContent = text;
+  return node;
 }
 
 function lengthOf(picture) {
   return Number(get("size").value) / data.bands[picture.band].samples; // screen pixels of a pixel of the strip
 }
 
+/** Return the address of a picture in the page. */
+const addressOf = name => `data:image/webp;base64,${get(name).textContent}`;
+
 /** Show the strips of the minute; only its pictures are decoded. */
 function drawStrips() {
   const strips = data.pictures.filter(picture => picture.minute === minute).map(picture => {
     const band = data.bands[picture.band], strip = element("div", "strip"), columns = element("div", "columns");
-    const scale = lengthOf(picture), source = get(`strip-${picture.band}-${picture.minute}`).textContent;
-    const address = `url("data:image/webp;base64,${source}")`;
+    const scale = lengthOf(picture), address = `url("${addressOf(`strip-${picture.band}-${picture.minute}`)}")`;
     columns.dataset.band = picture.band;
     for (let number = 0; number < picture.columns; number++) {
       const column = element("div", picture.is_upward ? "column up" : "column"), view = element("i");
@@ -155,66 +155,73 @@ const inMinute = () => allMarks().filter(mark => minuteOf(mark) === minute)
   .sort((a, b) => a.band - b.band || a.seconds - b.seconds);
 
 function labelOf(mark) {
-  const name = mark.error === "class" ? mark.correct : mark.class;
-  const direction = mark.error === "direction" ? mark.correct : mark.direction;
-  const arrow = direction === directionsOf(mark)[0] ? "◁" : "▷";
-  return `${arrow} ${name}${mark.id === undefined ? " +" : ` ${mark.id}`}`;
+  const directions = data.bands[mark.band]?.directions, arrow = directionOf(mark) === directions?.[0] ? "◁" : "▷";
+  const way = directions ? arrow : `${mark.line} ${clock(mark.seconds)}: ${mark.direction}`;
+  return `${way} ${classOf(mark)}${mark.id === undefined ? " +" : ` ${mark.id}`}`;
 }
 
 function drawMarks() {
-  for (const old of document.querySelectorAll(".mark")) old.remove();
+  for (const node of document.querySelectorAll(".mark")) node.remove();
   for (const mark of inMinute()) {
     const picture = data.pictures.find(item => item.band === mark.band && item.minute === minute);
-    const columns = document.querySelector(`.columns[data-band="${mark.band}"]`);
-    if (!picture || !columns) continue;
-    const along = (mark.seconds - MINUTE * minute) / picture.seconds;
-    const column = Math.min(Math.floor(along), picture.columns - 1), down = along - column;
-    const button = element("button", `mark ${mark.error ?? ""} ${mark.key === selected ? "selected" : ""}`, labelOf(mark));
+    const button = element("button", ["mark", ...Object.keys(mark.fixes), mark.key === selected ? "selected" : ""].join(" "), labelOf(mark));
     button.dataset.key = mark.key;
     button.title = `${mark.seconds.toFixed(2)} s, ${mark.direction}`;
-    Object.assign(button.style, { left: `${100 * mark.place}%`, top: `${100 * (picture.is_upward ? 1 - down : down)}%` });
     button.onclick = () => { selected = mark.key; refresh(); };
-    columns.children[column].append(button);
+    if (!picture) {
+      get("inside").append(button);
+      continue;
+    }
+    const along = (mark.seconds - MINUTE * minute) / picture.seconds;
+    const column = Math.min(Math.floor(along), picture.columns - 1), down = along - column;
+    Object.assign(button.style, { left: `${100 * mark.position}%`, top: `${100 * (picture.is_upward ? 1 - down : down)}%` });
+    document.querySelector(`.columns[data-band="${mark.band}"]`).children[column].append(button);
   }
 }
 
 function drawDetails() {
-  const mark = find(selected), box = get("details");
+  const mark = selectedMark(), box = get("details");
   if (!mark) return box.replaceChildren(element("p", "", "Select a mark, or click on a vehicle without one."));
   const words = { missed: "missed", false: "false: no vehicle", class: "wrong class", direction: "wrong direction" };
-  const title = `${mark.line}, ${clock(mark.seconds)}${mark.id === undefined ? "" : `, id ${mark.id}`}: ${words[mark.error] ?? "right"}`;
+  const errors = Object.keys(mark.fixes).map(error => words[error]).join(", ") || "right";
+  const title = `${mark.line}, ${clock(mark.seconds)}${mark.id === undefined ? "" : `, id ${mark.id}`}: ${errors}`;
   const button = (text, action, isOn) => {
-    const made = element("button", "", text);
-    made.setAttribute("aria-pressed", isOn);
-    made.onclick = action;
-    return made;
+    const node = element("button", "", text);
+    node.setAttribute("aria-pressed", isOn);
+    node.onclick = action;
+    return node;
   };
-  const name = mark.error === "class" ? mark.correct : mark.class;
-  const direction = mark.error === "direction" ? mark.correct : mark.direction;
   box.replaceChildren(element("h3", "", title),
-    button(mark.error === "missed" ? "X Remove" : "X False", toggleFalse, mark.error === "false"),
-    button(`D ${direction}`, turn, mark.error === "direction"),
-    ...data.classes.map((item, i) => button(`${i < 9 ? i + 1 : ""} ${item}`, () => setClass(item), item === name)));
+    button(isMissed(mark) ? "X Remove" : "X False", toggleFalse, "false" in mark.fixes),
+    button(`D ${directionOf(mark)}`, turn, "direction" in mark.fixes),
+    ...data.classes.map((item, i) => button(`${i < 9 ? i + 1 : ""} ${item}`, () => setClass(item), item === classOf(mark))));
+  if (!get(`crop-${mark.id}`)) return;
+  const image = element("img");
+  image.src = addressOf(`crop-${mark.id}`);
+  image.alt = `Best picture of ${mark.id}`;
+  box.prepend(image);
 }
 
-/** Return the rows of the table: line, class, counted, and in checked minutes: counted, missed, false, wrongly named. */
+const ERRORS = ["missed", "false", "class", "direction"];
+
+/** Return the rows of the table: line, class, counted, of these in checked minutes, and the number of each error. */
 function totals() {
-  const rows = new Map(), columns = ["counted", "checked", "missed", "false", "class", "direction"];
+  const rows = new Map();
   for (const mark of allMarks()) {
-    for (const name of [[mark.line, "all"], [mark.line, mark.class]]) {
-      const row = rows.get(name.join("\t")) ?? rows.set(name.join("\t"), Object.fromEntries(columns.map(item => [item, 0])))
-        .get(name.join("\t"));
-      if (mark.error !== "missed") row.counted++;
-      if (mark.error !== "missed" && state.checked.includes(minuteOf(mark))) row.checked++;
-      if (mark.error) row[mark.error]++;
+    for (const group of ["all", mark.class]) {
+      const name = JSON.stringify([mark.line, group]), row = rows.get(name) ?? [mark.line, group, 0, 0, 0, 0, 0, 0];
+      rows.set(name, row);
+      if (!isMissed(mark)) row[2]++;
+      if (!isMissed(mark) && state.checked.includes(minuteOf(mark))) row[3]++;
+      for (const error of Object.keys(mark.fixes)) row[4 + ERRORS.indexOf(error)]++;
     }
   }
-  return [...rows].map(([name, row]) => [...name.split("\t"), ...columns.map(item => row[item])]).sort((a, b) => a[0] < b[0] ? -1 : a[0] > b[0] ? 1 : b[2] - a[2]);
+  return [...rows.values()].sort((a, b) => a[0].localeCompare(b[0]) || b[2] - a[2]);
 }
 
 function drawSummary() {
   const table = element("table", "named"), head = element("tr");
-  for (const text of ["line", "class", "counted", "checked", "missed", "false", "class", "dir."]) head.append(element("th", "", text));
+  for (const text of ["line", "class", "counted", "checked", "missed", "false", "wrong class", "wrong way"]) head.append(element("th", "", text));
   table.append(head);
   for (const values of totals()) {
     const row = element("tr");
@@ -227,10 +234,10 @@ function drawSummary() {
 
 /** Show the estimate of the true count by the checked minutes of the sample. */
 function drawEstimate() {
-  const errors = allMarks().filter(mark => mark.error && mark.error !== "direction" && state.checked.includes(minuteOf(mark)))
-    .map(mark => ({ minute: minutes.indexOf(minuteOf(mark)), counted: mark.error === "missed" ? null : mark.class,
-      true: mark.error === "false" ? null : mark.correct ?? mark.class }));
-  const indices = list => new Set(list.map(item => minutes.indexOf(item)));
+  const errors = allMarks().filter(mark => Object.keys(mark.fixes).length && state.checked.includes(minuteOf(mark)))
+    .map(mark => ({ minute: data.minutes.indexOf(minuteOf(mark)), counted: isMissed(mark) ? null : mark.class,
+      true: "false" in mark.fixes ? null : classOf(mark) }));
+  const indices = list => new Set(list.map(item => data.minutes.indexOf(item)));
   const rows = estimateCounts({ counted: data.counted, strata: data.strata, errors, checked: indices(state.checked),
     drawn: indices(state.sample?.minutes ?? []) });
   const text = row => `${row.group ?? "all"}: ${row.counted} counted, ${Math.round(row.true)} true ` +
@@ -278,12 +285,19 @@ function spans() {
   return joined;
 }
 
-function eventText(mark) {
+function eventLine(mark, error, correct) {
   const parts = [`line: ${quoted(mark.line)}`, `time: ${mark.time}`, `direction: ${quoted(mark.direction)}`, `class: ${quoted(mark.class)}`];
   if (mark.id !== undefined) parts.push(`id: ${mark.id}`);
-  if (mark.error) parts.push(`error: ${quoted(mark.error)}`);
-  if (mark.correct) parts.push(`correct: ${quoted(mark.correct)}`);
+  if (error) parts.push(`error: ${quoted(error)}`);
+  if (correct) parts.push(`correct: ${quoted(correct)}`);
   return `  - {${parts.join(", ")}}`;
+}
+
+/** Return the lines of the file for a mark. One that is wrong in two ways is false, and another one was missed. */
+function eventLines(mark) {
+  const { class: name, direction } = mark.fixes;
+  if (name && direction) return [eventLine(mark, "false"), eventLine({ ...mark, id: undefined, class: name, direction }, "missed")];
+  return [eventLine(mark, ...(Object.entries(mark.fixes)[0] ?? []))];
 }
 
 function list(name, items) {
@@ -297,9 +311,10 @@ function corrections() {
   const zones = data.zones.map(zone => `  - {name: ${quoted(zone.name)}, points: [${zone.points.map(pair).join(", ")}]}`);
   const names = [...new Set(data.bands.map(band => band.name))];
   const checked = names.flatMap(name => spans().map(([start, end]) => `  - {line: ${quoted(name)}, start: ${start + data.start}, end: ${end + data.start}}`));
-  const complete = spans().concat(state.added.map(mark => [mark.seconds, mark.seconds]));
-  const isListed = mark => mark.error || complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
-  const events = allMarks().filter(isListed).sort((a, b) => a.time - b.time).map(eventText);
+  const complete = spans().concat(state.missed.map(mark => [mark.seconds, mark.seconds]));
+  const isListed = mark => Object.keys(mark.fixes).length ||
+    complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
+  const events = allMarks().filter(isListed).sort((a, b) => a.time - b.time).flatMap(eventLines);
   const sample = state.sample ? `{seed: ${state.sample.seed}, minutes: [${state.sample.minutes.join(", ")}]}` : "null";
   return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, ...list("lines", lines), ...list("zones", zones),
     `reviewer: ${state.reviewer ? quoted(state.reviewer) : "null"}`, `saved: ${now()}`, `sample: ${sample}`,
@@ -345,8 +360,8 @@ get("size").oninput = () => refresh(true);
 get("reviewer").onchange = event => change(() => { state.reviewer = event.target.value.trim(); });
 
 try {
-  const kept = JSON.parse(localStorage.getItem(key));
-  if (kept) ({ state, minute } = kept);
+  const stored = JSON.parse(localStorage.getItem(key));
+  if (stored) ({ state, minute } = stored);
 } catch {
   get("hint").textContent = "This browser keeps nothing; save before you close the page.";
 }

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
 from vdet.config.rendering import render_settings
@@ -17,7 +20,7 @@ from vdet.lanes.road import stage_images
 from vdet.media import Picture
 from vdet.media.cutting import copied_suffix, copy_part, encode_part
 from vdet.media.demux import is_pipe
-from vdet.media.images import encode_image, is_image_name
+from vdet.media.images import coarse_scale, encode_image, is_image_name, shrunk
 from vdet.media.writer import is_marked
 from vdet.pages.batch import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
@@ -89,7 +92,7 @@ class CropSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _is_crop)
-        self._crops = BestCrops()
+        self._crops = BestCrops(is_coarse=context.settings.output.coarse)
         self._written: dict[int, tuple[float, Path]] = {}
 
     def finish(self) -> None:
@@ -134,7 +137,7 @@ class PageSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._file = context.files.stage_folder(path) / PAGE_NAME
-        self._crops = BestCrops()
+        self._crops = BestCrops(is_coarse=context.settings.output.coarse)
         self._thumbnails: dict[int, tuple[float, str]] = {}
         self._spans: list[Span] = []
         self._fullest: Picture | None = None
@@ -170,7 +173,7 @@ class PageSink(BaseSink):
             spans=self._spans or [(start, start)],
             records=traffic.vehicles,
             thumbnails=self._thumbnails,
-            poster=self._fullest.image if self._fullest else None,
+            poster=self._poster(),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
             counts=traffic.counts(),
@@ -180,6 +183,17 @@ class PageSink(BaseSink):
             borders=counter.borders if counter else (),
             findings=findings_in(self.context.facts).items,
         )
+
+    def _poster(self) -> Image | None:
+        if not self._fullest:
+            return None
+        image, boxes = self._fullest.image, [record.largest for record in self.traffic.vehicles]
+        if not self.context.settings.output.coarse:
+            return image
+        height, width = image.shape[:2]
+        largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
+        reduced = shrunk(image, coarse_scale(largest, height))
+        return np.asarray(cv2.resize(reduced, (width, height)), np.uint8)  # marks are drawn on it
 
     def _pictures(self) -> dict[int, str]:
         """Return the addresses of the images of `crops`, if this run writes them."""

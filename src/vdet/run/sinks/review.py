@@ -1,8 +1,8 @@
 """The sink `review`: strips of all lines with the counted crossings, in one page."""
 
 import tempfile
-from base64 import b64encode
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,10 +13,12 @@ from vdet.boxes import Image
 from vdet.errors import OutputError
 from vdet.media import Picture
 from vdet.media.frame import Coding
-from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, write_picture, write_review
+from vdet.media.images import coarse_scale, shrunk
+from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, crop_name, write_review
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
-from vdet.traffic.counts import Counts
+from vdet.traffic.counts import Event
+from vdet.traffic.records import BestCrops, Crop
 from vdet.traffic.strips import (
     Band,
     Passage,
@@ -35,9 +37,20 @@ _WAITING_BYTES = 48_000_000
 """Maximum memory of the frames of one band that wait for its sampling."""
 _COLUMN_ROWS = 800
 """Approximate height of the columns that a strip is cut into, pixels."""
+_CROP_SIDE = 120
+"""Maximum side of the picture of a vehicle, pixels."""
 _QUALITY = 60
 _SAME = 1.0
 """Maximum seconds between a counted crossing and the passage that gives its place."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class _Spot:
+    """A place for the mark of an event: `seconds` between them, band, position from 0 to 1."""
+
+    seconds: float
+    band: int | None
+    position: float
 
 
 @dataclass(slots=True)
@@ -74,7 +87,7 @@ class _Strip:
 
 
 class ReviewSink(BaseSink):
-    """Writes the strips minute by minute while the video is read, and the page at the end."""
+    """Writes pictures while the video is read, strips minute by minute, and the page at the end."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
@@ -86,14 +99,15 @@ class ReviewSink(BaseSink):
         bands = bands_of((*counter.lines, *counter.zones))
         self._strips = [_Strip(band) for band in bands]
         self._passages = Passages(bands)
-        self._written = tempfile.TemporaryFile("w+", encoding="ascii")  # noqa: SIM115  # closed at the end
+        self._crops = BestCrops(is_coarse=context.settings.output.coarse)
+        self._folder = tempfile.TemporaryDirectory()
         self._pictures: list[StripPicture] = []
         self._minute = 0
         self._coding: Coding | None = None
         self._start = float(self.video.start)
 
     def __exit__(self, kind: object, *_: object) -> None:
-        with self._written:
+        with self._folder:
             if kind is None:
                 self.finish()
 
@@ -105,15 +119,16 @@ class ReviewSink(BaseSink):
             self._minute = minute
         self._coding = picture.planes.coding if (picture := result.frame.picture).planes else None
         self._passages.add(result.frame_tracks)
-        for strip, found in zip(self._strips, self._passages.found, strict=True):
-            strip.add(seconds - _MINUTE * minute, picture, found)
+        for strip, passages in zip(self._strips, self._passages.found, strict=True):
+            strip.add(seconds - _MINUTE * minute, picture, passages)
+        self._write_crops(self._crops.add(result.frame_tracks, picture))
 
     def _end_minute(self) -> None:
-        for number, (strip, found) in enumerate(
+        for number, (strip, passages) in enumerate(
             zip(self._strips, self._passages.found, strict=True)
         ):
             if strip.waiting:
-                strip.decide(found)
+                strip.decide(passages)
             if strip.rows and strip.sampling:
                 self._write_minute(number, strip, strip.sampling)
             strip.rows = []
@@ -134,15 +149,32 @@ class ReviewSink(BaseSink):
         if self._coding:
             luma, blue, red = (np.ascontiguousarray(layer) for layer in np.moveaxis(flat, 2, 0))
             flat = self._coding.to_bgr((luma, blue, red))
-        _, data = cv2.imencode(".webp", flat, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
-        self._pictures.append(
-            StripPicture(number, self._minute, columns, seconds, height, sampling.is_upward)
-        )
-        write_picture(self._written, self._pictures[-1], b64encode(data.tobytes()).decode("ascii"))
+        picture = StripPicture(number, self._minute, columns, seconds, height, sampling.is_upward)
+        self._pictures.append(picture)
+        self._write(picture.name, self._shown(flat, number))
+
+    def _shown(self, strip: Image, number: int) -> Image:
+        """Return the picture of a strip in the detail that `output.coarse` allows."""
+        if not self.context.settings.output.coarse:
+            return strip
+        band, passages = self._strips[number].band, self._passages.found[number]
+        widest = max((passage.width for passage in passages), default=0.0)
+        scale = coarse_scale(widest / band.length * band.samples, band.samples)
+        return shrunk(strip, round(scale * band.samples) / band.samples)  # whole pixels a column
+
+    def _write_crops(self, crops: Sequence[Crop]) -> None:
+        for crop in crops:
+            scale = _CROP_SIDE / max(crop.image.shape)
+            self._write(crop_name(crop.id), shrunk(crop.image, scale))
+
+    def _write(self, name: str, image: Image) -> None:
+        _, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+        (Path(self._folder.name) / name).write_bytes(data.tobytes())
 
     def finish(self) -> None:
         """Write the page."""
         self._end_minute()
+        self._write_crops(self._crops.end())
         counts = self.traffic.counts()
         assert counts
         review = Review(
@@ -150,33 +182,33 @@ class ReviewSink(BaseSink):
             traffic=self.context.settings.traffic,
             bands=[strip.band for strip in self._strips],
             pictures=self._pictures,
-            marks=self._marks(counts),
+            marks=self._marks(counts.events),
         )
         with self._file.open("w", encoding="utf-8", errors="backslashreplace") as file:
-            self._written.seek(0)
-            write_review(file, review, self._written)
+            write_review(file, review, Path(self._folder.name))
 
-    def _marks(self, counts: Counts) -> list[Mark]:
-        """Return where the counted crossings are; those of zones without a side are left out."""
-        marks = []
-        by_strip_and_id: dict[tuple[int, int], list[Passage]] = defaultdict(list)
+    def _marks(self, events: Sequence[Event]) -> list[Mark]:
+        """Return where the counted events are."""
+        by_band_and_id: dict[tuple[int, int], list[Passage]] = defaultdict(list)
         for number, passages in enumerate(self._passages.found):
             for passage in passages:
-                by_strip_and_id[number, passage.id].append(passage)
-        for event in counts.events:
-            near = [
-                (abs(passage.time - event.time), number, passage.place)
+                by_band_and_id[number, passage.id].append(passage)
+        marks = []
+        for event in events:
+            bands = [
+                number
                 for number, strip in enumerate(self._strips)
                 if strip.band.name == event.name and event.direction in strip.band.directions
-                for passage in (
-                    *by_strip_and_id.get((number, event.id), ()),
-                    Passage(event.id, event.time + _SAME, 0.5, (0, 0)),  # if there is none
-                )
             ]
-            if near:
-                _, band, place = min(near)
-                seconds = event.time - self._start
-                marks.append(Mark(band, round(seconds, 3), round(place, 3), event))
+            spots = [
+                _Spot(abs(passage.time - event.time), band, passage.place)
+                for band in bands
+                for passage in by_band_and_id.get((band, event.id), ())
+            ]
+            spots += [_Spot(_SAME, band, 0.5) for band in bands]  # if there is no passage
+            spot = min(spots, default=_Spot(0.0, None, 0.5))
+            seconds = round(event.time - self._start, 3)
+            marks.append(Mark(spot.band, seconds, round(spot.position, 3), event))
         return marks
 
 
