@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from red_cars import CAR, SETTINGS, road
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
 from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
 from vdet.boxes import Image
+from vdet.config.schema import OutputSettings
 from vdet.config.shapes import RegionSettings
 from vdet.media.images import decode_image
 from vdet.run.sinks import Output
@@ -77,6 +78,21 @@ def test_the_still_is_the_first_frame_that_shows_the_most_vehicles(tmp_path: Pat
     write(Output("page", tmp_path / "page"), results)
     (still,) = page_of(tmp_path / "page").all("img", **{"class": "still"})
     assert picture(still["src"]).mean() > 150
+
+
+def test_coarse_pages_have_no_readable_faces_or_plates(tmp_path: Path) -> None:
+    fine = np.indices((HEIGHT, WIDTH)).sum(axis=0) % 2 * 255  # details of one pixel
+    shown = result_of(CAR, image=np.repeat(fine[..., np.newaxis], 3, axis=2).astype(np.uint8))
+    output = OutputSettings(coarse=True)
+    write(
+        Output("page", tmp_path), [shown], settings=SETTINGS.model_copy(update={"output": output})
+    )
+    (table,) = re.findall('id="vehicles">(.*?)<', (tmp_path / "page.html").read_text())
+    (thumbnail,) = json.loads(table)["picture"]
+    assert picture(thumbnail).shape == (36, 48, 3)  # 40 pixels, and a tenth around it
+    (still,) = page_of(tmp_path).all("img", **{"class": "still"})
+    for uri in (thumbnail, still["src"]):
+        assert np.median(np.abs(np.diff(picture(uri).astype(int), axis=1))) < 20
 
 
 def test_the_folders_of_a_mask_are_nobodys_business(red_clip: Path, tmp_path: Path) -> None:
