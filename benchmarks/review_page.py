@@ -1,0 +1,329 @@
+"""The page of a review: its size, how fast it is, and how many actions a review takes in Chromium.
+
+    python -m benchmarks.review_page
+
+An hour of a drawn road seen from a pole, with four lanes and 600 vehicles at one line. Of the
+tracks 5 % are missing, 5 % have the wrong class, and as many show no vehicle. A script in the page
+checks all minutes as a person would who sees each error: it clicks on marks and on the strip, and
+presses keys. Then the corrections are applied, and must give the true counts.
+"""
+
+import json
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.pages import in_chromium
+from benchmarks.pole_cameras import MIN_WIDTH
+from vdet.boxes import NO_BOXES, Image
+from vdet.config.schema import Settings
+from vdet.files import OutputFiles
+from vdet.media import Frame, Picture, Planes, VideoInfo
+from vdet.media.frame import Coding
+from vdet.pages.review import PAGE_NAME
+from vdet.run.result import FrameResult
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import SinkContext, open_sinks
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import (
+    LANE_WIDTH,
+    LORRY,
+    Scene,
+    SceneVehicle,
+    Waypoint,
+    empty_road,
+    random_body,
+    random_paint,
+)
+from vdet.synthetic.truth import true_boxes
+from vdet.synthetic.vehicle import draw_vehicle
+from vdet.track.track import FrameTracks, Track
+from vdet.traffic.corrections import Corrections
+from vdet.traffic.counts import Counts
+from vdet.traffic.live import LiveTraffic
+from vdet.traffic.strips import Passages, bands_of
+
+SECONDS, VEHICLES, RATE = 3600, 600, Fraction(25, 2)
+EACH = VEHICLES // 20  # missed, false, and of a wrong class
+ROADS = 12  # images of the empty road, which differ by their noise
+SETTINGS = Settings.model_validate(
+    {"traffic": {"lines": [{"name": "gate", "start": [0.02, 0.62], "end": [0.98, 0.62]}]}}
+)
+ACTIONS = """
+<iframe id="hold"></iframe>
+<script>
+(async () => {
+get("hold").contentDocument.open(); // the page has loaded when it is closed
+const firstView = performance.now();
+let taken = 0;
+const times = { key: [], minute: [] };
+const keyOf = name => String(data.classes.indexOf(name) + 1);
+const painted = () => new Promise(done => requestAnimationFrame(() => setTimeout(done)));
+
+async function shown() {
+  for (const strip of data.pictures.filter(picture => picture.minute === minute)) {
+    const image = new Image();
+    image.src = addressOf(`strip-${strip.band}-${strip.minute}`);
+    await image.decode();
+  }
+  await painted();
+}
+
+async function press(key) {
+  const begin = performance.now();
+  document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+  document.body.offsetHeight;
+  await (key === "Enter" ? shown() : painted());
+  times[key === "Enter" ? "minute" : "key"].push(performance.now() - begin);
+  taken++;
+}
+
+/** Click at a point of the window if it hits the element; return whether it does. */
+function click(element, clientX, clientY) {
+  const target = document.elementFromPoint(clientX, clientY);
+  if (target !== element && target?.closest(".mark, .column") !== element) return false;
+  target.dispatchEvent(new MouseEvent("click", { clientX, clientY, bubbles: true }));
+  taken++;
+  return true;
+}
+
+async function select(id) {
+  const mark = allMarks().find(item => item.id === id);
+  const button = document.querySelector(`[data-key="${mark.key}"]`);
+  button.scrollIntoView({ block: "center" });
+  const box = button.getBoundingClientRect();
+  for (const across of [0.5, 0.15, 0.85])
+    for (const down of [0.5, 0.15, 0.85])
+      if (click(button, box.left + across * box.width, box.top + down * box.height)) return;
+  while (selected !== mark.key) await press("Tab");
+}
+
+async function add(error) {
+  const picture = data.pictures.find(item => item.minute === minute);
+  for (const seconds of [0, 0.05, -0.05, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3]) {
+    const along = (error.seconds + seconds - 60 * minute) / picture.seconds;
+    const column = document.querySelectorAll(".column")[Math.floor(along)];
+    if (!column) continue;
+    column.scrollIntoView({ block: "center" });
+    const box = column.getBoundingClientRect(), down = along % 1;
+    const y = box.top + (picture.is_upward ? 1 - down : down) * box.height;
+    if (click(column, box.left + error.position * box.width, y)) break;
+  }
+  if (classOf(selectedMark()) !== error.class) await press(keyOf(error.class));
+  if (directionOf(selectedMark()) !== error.direction) await press("d");
+}
+
+await shown();
+const view = performance.now(), each = {}, empty = [];
+for (const number of data.minutes) {
+  const errors = ERRORS_OF_HOUR.filter(error => Math.floor(error.seconds / 60) === number);
+  for (const error of errors) {
+    taken = 0;
+    if (error.kind === "missed") await add(error);
+    else {
+      await select(error.id);
+      await press(error.kind === "false" ? "x" : keyOf(error.class));
+    }
+    (each[error.kind] ??= []).push(taken);
+  }
+  taken = 0;
+  await press("Enter");
+  if (!errors.length) empty.push(taken);
+}
+const text = corrections();
+document.title = JSON.stringify({ firstView, view, each, empty, times, corrections: text });
+})().catch(error => { document.title = JSON.stringify(error.stack); })
+  .finally(() => get("hold").contentDocument.close());
+</script></body>"""
+
+
+@dataclass(frozen=True)
+class Error:
+    """What a reviewer sees: `kind` is missed, false or class; `class` is the true one."""
+
+    kind: str
+    id: int
+    seconds: float
+    position: float
+    direction: str
+    name: str
+
+    def values(self) -> dict[str, Any]:
+        """Return it for the script."""
+        values = asdict(self)
+        return values | {"class": values.pop("name")}
+
+
+@dataclass(frozen=True)
+class Hour:
+    """A road, its vehicles with their classes, and the numbers of the wrong ones."""
+
+    scene: Scene
+    classes: dict[int, str]
+    missed: frozenset[int]
+    false: frozenset[int]
+    renamed: frozenset[int]
+
+    def tracks(self, index: int, *, is_true: bool) -> FrameTracks:
+        """Return the true tracks of a frame, or those of the detector."""
+        skipped = self.false if is_true else self.missed
+        shown = []
+        for item in true_boxes(self.at(index), index):
+            if item.id in skipped or item.box.width < MIN_WIDTH * self.scene.camera.width:
+                continue
+            name = self.classes[item.id]
+            if item.id in self.renamed and not is_true:
+                name = "bus" if name == "truck" else "truck"
+            shown.append(Track(item.id, item.box, 0.9, "detected", name))
+        return FrameTracks(index, self.scene.time(index), tuple(shown))
+
+    def at(self, index: int) -> Scene:
+        """Return the scene with the vehicles of a frame only."""
+        moment = self.scene.time(index)
+        vehicles = tuple(
+            vehicle
+            for vehicle in self.scene.vehicles
+            if vehicle.path[0].time <= moment <= vehicle.path[-1].time
+        )
+        return replace(self.scene, vehicles=vehicles)
+
+    def frames(self) -> Iterator[Frame]:
+        """Draw the hour."""
+        renderer = Renderer(replace(self.scene, vehicles=()))
+        roads = [renderer.image(index) for index in range(ROADS)]
+        for index in range(self.scene.frames):
+            image = self._drawn(roads[index * 7 % ROADS].copy(), index)
+            picture = Picture(Planes.of_image(image, Coding()))
+            yield Frame(index, index / RATE, picture)
+
+    def _drawn(self, road: Image, index: int) -> Image:
+        scene = self.at(index)
+        for position, vehicle in reversed(scene.nearest_first(scene.time(index))):
+            if vehicle.id not in self.false:
+                draw_vehicle(road, vehicle, position, scene)
+        return road
+
+
+def hour(seed: int = 1) -> Hour:
+    """Return the road; vehicles of a lane keep a distance of 1.5 s at least."""
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, PinholeCamera.pole(960, 540), lane=1, lanes=4, seed=seed)
+    total = VEHICLES + EACH  # the false ones are not there
+    starts = np.sort(rng.uniform(0, SECONDS - 12, total))
+    lanes, last = rng.integers(0, 4, total), np.full(4, -10.0)
+    vehicles, classes = [], {}
+    for number, (start, lane) in enumerate(zip(starts.tolist(), lanes.tolist(), strict=True), 1):
+        first = last[lane] = max(start, last[lane] + 1.5)
+        name = str(rng.choice(["car", "truck", "bus"], p=[0.8, 0.15, 0.05]))
+        lateral, comes = (lane - 1) * LANE_WIDTH, lane < 2
+        far, near = (90.0, -10.0) if comes else (-10.0, 90.0)
+        ends = (first, far), (first + 100 / 15, near)
+        path = tuple(Waypoint(moment, ahead, lateral, np.pi * comes) for moment, ahead in ends)
+        body = random_body(rng) if name == "car" else LORRY
+        vehicles.append(SceneVehicle(number, path, random_paint(rng), body))
+        classes[number] = name
+    chosen = [int(number) for number in rng.permutation(total)[: 3 * EACH] + 1]
+    missed, false, renamed = (frozenset(chosen[part::3]) for part in range(3))
+    still = replace(scene, roadside=(), speed=0.0, rate=RATE, frames=int(SECONDS * RATE))
+    road = replace(still, vehicles=tuple(vehicles))
+    return Hour(road, classes, missed, false, renamed)
+
+
+def write_page(road: Hour, folder: Path) -> Counts:
+    """Write the page, and return the counts without corrections."""
+    camera = road.scene.camera
+    video = VideoInfo(Path("hour.mp4"), camera.width, camera.height, RATE, 1 / RATE)
+    with OutputFiles(overwrite=True) as files:
+        traffic = LiveTraffic(SETTINGS, camera.width, camera.height)
+        context = SinkContext(files, SETTINGS, video, traffic=traffic)
+        with open_sinks([Output("review", folder)], context) as sinks:
+            for frame in road.frames():
+                tracks = road.tracks(frame.index, is_true=False)
+                traffic.add(tracks)
+                sinks.write(FrameResult(video.path, frame, NO_BOXES, tracks.tracks))
+            traffic.end()
+    return counts_of(traffic)
+
+
+def counts_of(traffic: LiveTraffic) -> Counts:
+    """Return the counts at the end."""
+    counts = traffic.counts()
+    assert counts
+    return counts
+
+
+def truth_of(road: Hour) -> tuple[Counts, list[Error]]:
+    """Return the true counts, and the errors of the others."""
+    camera = road.scene.camera
+    traffic = LiveTraffic(SETTINGS, camera.width, camera.height)
+    everything = LiveTraffic(SETTINGS, camera.width, camera.height)
+    assert traffic.counter
+    passages = Passages(bands_of(traffic.counter.lines))
+    for index in range(road.scene.frames):
+        true, other = (road.tracks(index, is_true=is_true) for is_true in (True, False))
+        traffic.add(true)
+        everything.add(other)
+        passages.add(true)
+    traffic.end()
+    everything.end()
+    positions = {passage.id: passage.place for passage in passages.found[0]}
+    kinds = {**dict.fromkeys(road.missed, "missed"), **dict.fromkeys(road.renamed, "class")}
+    kinds |= dict.fromkeys(road.false, "false")
+    events = [event for event in counts_of(traffic).events if event.id in kinds]
+    events += [event for event in counts_of(everything).events if event.id in road.false]
+    errors = [
+        Error(
+            kind=kinds[event.id],
+            id=event.id,
+            seconds=event.time,
+            position=positions.get(event.id, 0.5),
+            direction=event.direction,
+            name=road.classes[event.id],
+        )
+        for event in sorted(events, key=lambda event: event.time)
+    ]
+    return counts_of(traffic), errors
+
+
+def by_class(counts: Counts) -> Counter[tuple[str, str | None]]:
+    """Return the number of events by direction and class."""
+    return Counter((event.direction, event.class_name) for event in counts.events)
+
+
+def main() -> None:
+    """Print the figures."""
+    road = hour()
+    true, errors = truth_of(road)
+    with tempfile.TemporaryDirectory() as name:
+        folder, begin = Path(name), time.perf_counter()
+        counts = write_page(road, folder / "review")
+        page = folder / "review" / PAGE_NAME
+        print(f"{len(counts.events)} counted, {len(true.events)} true, {len(errors)} errors")
+        print(f"page: {page.stat().st_size / 1e6:.1f} MB, {time.perf_counter() - begin:.0f} s")
+        values = json.dumps([error.values() for error in errors])
+        script = ACTIONS.replace("ERRORS_OF_HOUR", values)
+        measured = in_chromium(page, {"</body>": script})
+        print(
+            f"first view: {measured['firstView']:.0f} ms, with pictures {measured['view']:.0f} ms"
+        )
+        for what, taken in measured["times"].items():
+            print(f"a {what}: median {np.median(taken):.0f} ms, at most {max(taken):.0f} ms")
+        print(f"keys a minute without errors: {max(measured['empty'])}")
+        for kind, taken in measured["each"].items():
+            print(f"{kind}: {len(taken)} errors, {np.mean(taken):.2f} actions, most {max(taken)}")
+        path = folder / "corrections.yaml"
+        path.write_text(measured["corrections"], encoding="utf-8")
+        corrected = Corrections.read(path).apply(counts)
+        print(f"counts by class are exact: {by_class(corrected) == by_class(true)}")
+
+
+if __name__ == "__main__":
+    main()
