@@ -7,8 +7,8 @@ import pytest
 from av.video.reformatter import ColorRange
 
 from codings import in_any_coding
-from vdet.boxes import Image
-from vdet.media.frame import Coding, Planes
+from vdet.boxes import Box, Image
+from vdet.media.frame import Coding, Picture, Planes
 
 
 def decoded(
@@ -151,3 +151,15 @@ def test_chroma_may_have_half_the_size_or_that_of_luma(
     np.testing.assert_array_equal(half[0], whole[0])
     for ours, other in zip(half[1:], whole[1:], strict=True):
         np.testing.assert_array_equal(ours.repeat(2, 0).repeat(2, 1)[:height, :width], other)
+
+
+@in_any_coding
+@pytest.mark.parametrize("box", [Box(7, 5, 30, 20), Box(8, 6, 31, 21), Box(-5, -5, 70, 9)])
+def test_a_part_has_the_colours_of_the_whole_also_after_it_changed(
+    coding: Coding, box: Box
+) -> None:
+    picture = Picture(Planes.of_image(slopes(64, 48), coding))
+    expected, part = box.cut(picture.image).astype(int), picture.cut(box)
+    assert picture.planes
+    picture.planes.luma[:] = 0
+    np.testing.assert_allclose(part().astype(int), expected, atol=4)

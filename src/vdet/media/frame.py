@@ -1,6 +1,6 @@
 """A frame of a video: its pixels (BGR, or decoder planes), its time, and its video."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -231,16 +231,19 @@ class Picture:
         """Return a copy of the pixels that may be changed: see `Planes.copy`."""
         return self.planes.copy(used) if self.planes else self.image.copy()
 
-    def cut(self, box: Box) -> Image:
-        """Return a copy of the part in a box, BGR; of planes, only that part is converted."""
+    def cut(self, box: Box) -> Callable[[], Image]:
+        """Copy the part in a box. Return a function that converts it to BGR uint8 `(H, W, 3)`."""
         if not self.planes:
-            return box.cut(self.image).copy()
+            part = box.cut(self.image).copy()
+            return lambda: part
         x1, y1, x2, y2 = (max(0, side) for side in box.pixels)
-        luma, *chroma = self.planes.layers
-        left, top = x1 // 2, y1 // 2
-        blue, red = (layer[top : (y2 + 1) // 2, left : (x2 + 1) // 2] for layer in chroma)
-        whole = self.planes.coding.to_bgr((luma[2 * top : y2, 2 * left : x2], blue, red))
-        return whole[y1 - 2 * top :, x1 - 2 * left :]
+        x, y, coding = x1 // 2, y1 // 2, self.planes.coding  # chroma values stand for 2 × 2 pixels
+        luma = self.planes.luma[2 * y : y2, 2 * x : x2].copy()
+        blue, red = (
+            layer[y : (y2 + 1) // 2, x : (x2 + 1) // 2].copy()
+            for layer in (self.planes.blue, self.planes.red)
+        )
+        return lambda: coding.to_bgr((luma, blue, red))[y1 % 2 :, x1 % 2 :]
 
     @cached_property
     def image(self) -> Image:

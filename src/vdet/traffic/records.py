@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -316,7 +317,7 @@ class BestCrops:
 
     def __init__(self, *, is_coarse: bool = False) -> None:
         self._is_coarse = is_coarse
-        self._best: dict[int, Crop] = {}
+        self._best: dict[int, Callable[[], Crop]] = {}
         self._merits: dict[int, _Merit] = {}
 
     def add(self, frame: FrameTracks, picture: Picture) -> list[Crop]:
@@ -328,24 +329,28 @@ class BestCrops:
         reappears and gets a better image, it is returned again.
         """
         shown = {track.id for track in frame.tracks}
-        gone = [self._best.pop(number) for number in sorted(self._best.keys() - shown)]
+        gone = [self._best.pop(number)() for number in sorted(self._best.keys() - shown)]
         for track in frame.tracks:
             merit = _merit(track, picture)
             if merit and merit > self._merits.get(track.id, (False, 0.0)):
                 self._merits[track.id] = merit
-                self._best[track.id] = Crop(track.id, frame.time, self._cut(track.box, picture))
+                part = picture.cut(_padded(track.box.rounded))
+                self._best[track.id] = partial(self._crop, track, frame.time, part)
         return gone
 
     def end(self) -> list[Crop]:
         """Return the images of the vehicles that the last frame shows."""
-        return [crop for _, crop in sorted(self._best.items())]
+        return [self._best[number]() for number in sorted(self._best)]
 
-    def _cut(self, box: Box, picture: Picture) -> Image:
-        box = box.rounded
-        x, y = (round(side * _PADDING) for side in (box.width, box.height))
-        image = picture.cut(Box(box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y))
-        side = max(box.width, box.height)
-        return shrunk(image, coarse_scale(side, side)) if self._is_coarse else image
+    def _crop(self, track: Track, time: float, part: Callable[[], Image]) -> Crop:
+        side = max(track.box.width, track.box.height)
+        scale = coarse_scale(side, side) if self._is_coarse else 1.0
+        return Crop(track.id, time, shrunk(part(), scale))
+
+
+def _padded(box: Box) -> Box:
+    x, y = (round(side * _PADDING) for side in (box.width, box.height))
+    return Box(box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y)
 
 
 def _merit(track: Track, picture: Picture) -> _Merit | None:

@@ -174,7 +174,7 @@ function drawMarks() {
     }
     const along = (mark.seconds - MINUTE * minute) / picture.seconds;
     const column = Math.min(Math.floor(along), picture.columns - 1), down = along - column;
-    Object.assign(button.style, { left: `${100 * mark.position}%`, top: `${100 * (picture.is_upward ? 1 - down : down)}%` });
+    Object.assign(button.style, { left: `clamp(36px, ${100 * mark.position}%, calc(100% - 36px))`, top: `${100 * (picture.is_upward ? 1 - down : down)}%` });
     document.querySelector(`.columns[data-band="${mark.band}"]`).children[column].append(button);
   }
 }
@@ -221,7 +221,7 @@ function totals() {
 
 function drawSummary() {
   const table = element("table", "named"), head = element("tr");
-  for (const text of ["line", "class", "counted", "checked", "missed", "false", "wrong class", "wrong way"]) head.append(element("th", "", text));
+  for (const text of ["line", "class", "counted", "checked", "missed", "false", "wrong class", "wrong direction"]) head.append(element("th", "", text));
   table.append(head);
   for (const values of totals()) {
     const row = element("tr");
