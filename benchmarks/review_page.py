@@ -12,7 +12,7 @@ import json
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -25,8 +25,7 @@ from benchmarks.pole_cameras import MIN_WIDTH
 from vdet.boxes import NO_BOXES, Image
 from vdet.config.schema import Settings
 from vdet.files import OutputFiles
-from vdet.media import Frame, Picture, Planes, VideoInfo
-from vdet.media.frame import Coding
+from vdet.media import Frame, Picture, VideoInfo
 from vdet.pages.review import PAGE_NAME
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
@@ -43,13 +42,13 @@ from vdet.synthetic.scene import (
     random_body,
     random_paint,
 )
-from vdet.synthetic.truth import true_boxes
+from vdet.synthetic.truth import TrueBox, true_boxes
 from vdet.synthetic.vehicle import draw_vehicle
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.corrections import Corrections
 from vdet.traffic.counts import Counts
 from vdet.traffic.live import LiveTraffic
-from vdet.traffic.strips import Passages, bands_of
+from vdet.traffic.strips import Passage, Passages, bands_of
 
 SECONDS, VEHICLES, RATE = 3600, 600, Fraction(25, 2)
 EACH = VEHICLES // 20  # missed, false, and of a wrong class
@@ -172,11 +171,11 @@ class Hour:
     false: frozenset[int]
     renamed: frozenset[int]
 
-    def tracks(self, index: int, *, is_true: bool) -> FrameTracks:
+    def tracks(self, index: int, *, is_true: bool, boxes: Sequence[TrueBox]) -> FrameTracks:
         """Return the true tracks of a frame, or those of the detector."""
         skipped = self.false if is_true else self.missed
         shown = []
-        for item in true_boxes(self.at(index), index):
+        for item in boxes:
             if item.id in skipped or item.box.width < MIN_WIDTH * self.scene.camera.width:
                 continue
             name = self.classes[item.id]
@@ -201,8 +200,7 @@ class Hour:
         roads = [renderer.image(index) for index in range(ROADS)]
         for index in range(self.scene.frames):
             image = self._drawn(roads[index * 7 % ROADS].copy(), index)
-            picture = Picture(Planes.of_image(image, Coding()))
-            yield Frame(index, index / RATE, picture)
+            yield Frame(index, index / RATE, Picture(image))
 
     def _drawn(self, road: Image, index: int) -> Image:
         scene = self.at(index)
@@ -237,60 +235,57 @@ def hour(seed: int = 1) -> Hour:
     return Hour(road, classes, missed, false, renamed)
 
 
-def write_page(road: Hour, folder: Path) -> Counts:
-    """Write the page, and return the counts without corrections."""
+@dataclass(frozen=True)
+class Survey:
+    """The counts of the page, the true ones, and where the vehicles pass the line."""
+
+    counts: Counts
+    true: Counts
+    passages: Sequence[Passage]
+
+    def errors(self, road: Hour) -> list[Error]:
+        """Return the errors in the order of time."""
+        kinds = {**dict.fromkeys(road.missed, "missed"), **dict.fromkeys(road.renamed, "class")}
+        events = [event for event in self.true.events if event.id in kinds]
+        events += [event for event in self.counts.events if event.id in road.false]
+        positions = {passage.id: passage.place for passage in self.passages}
+        return [
+            Error(
+                kind=kinds.get(event.id, "false"),
+                id=event.id,
+                seconds=event.time,
+                position=positions.get(event.id, 0.5),
+                direction=event.direction,
+                name=road.classes[event.id],
+            )
+            for event in sorted(events, key=lambda event: event.time)
+        ]
+
+
+def write_page(road: Hour, folder: Path) -> Survey:
+    """Write the page, and return what it should show."""
     camera = road.scene.camera
     video = VideoInfo(Path("hour.mp4"), camera.width, camera.height, RATE, 1 / RATE)
+    traffic, true = (LiveTraffic(SETTINGS, camera.width, camera.height) for _ in range(2))
+    assert traffic.counter
+    passages = Passages(bands_of(traffic.counter.lines))
     with OutputFiles(overwrite=True) as files:
-        traffic = LiveTraffic(SETTINGS, camera.width, camera.height)
         context = SinkContext(files, SETTINGS, video, traffic=traffic)
         with open_sinks([Output("review", folder)], context) as sinks:
             for frame in road.frames():
-                tracks = road.tracks(frame.index, is_true=False)
+                boxes = true_boxes(road.at(frame.index), frame.index)
+                tracks = road.tracks(frame.index, is_true=False, boxes=boxes)
                 traffic.add(tracks)
                 sinks.write(FrameResult(video.path, frame, NO_BOXES, tracks.tracks))
+                true_tracks = road.tracks(frame.index, is_true=True, boxes=boxes)
+                true.add(true_tracks)
+                passages.add(true_tracks)
             traffic.end()
-    return counts_of(traffic)
-
-
-def counts_of(traffic: LiveTraffic) -> Counts:
-    """Return the counts at the end."""
-    counts = traffic.counts()
+    true.end()
+    counts, true_counts = traffic.counts(), true.counts()
     assert counts
-    return counts
-
-
-def truth_of(road: Hour) -> tuple[Counts, list[Error]]:
-    """Return the true counts, and the errors of the others."""
-    camera = road.scene.camera
-    traffic = LiveTraffic(SETTINGS, camera.width, camera.height)
-    everything = LiveTraffic(SETTINGS, camera.width, camera.height)
-    assert traffic.counter
-    passages = Passages(bands_of(traffic.counter.lines))
-    for index in range(road.scene.frames):
-        true, other = (road.tracks(index, is_true=is_true) for is_true in (True, False))
-        traffic.add(true)
-        everything.add(other)
-        passages.add(true)
-    traffic.end()
-    everything.end()
-    positions = {passage.id: passage.place for passage in passages.found[0]}
-    kinds = {**dict.fromkeys(road.missed, "missed"), **dict.fromkeys(road.renamed, "class")}
-    kinds |= dict.fromkeys(road.false, "false")
-    events = [event for event in counts_of(traffic).events if event.id in kinds]
-    events += [event for event in counts_of(everything).events if event.id in road.false]
-    errors = [
-        Error(
-            kind=kinds[event.id],
-            id=event.id,
-            seconds=event.time,
-            position=positions.get(event.id, 0.5),
-            direction=event.direction,
-            name=road.classes[event.id],
-        )
-        for event in sorted(events, key=lambda event: event.time)
-    ]
-    return counts_of(traffic), errors
+    assert true_counts
+    return Survey(counts, true_counts, passages.found[0])
 
 
 def by_class(counts: Counts) -> Counter[tuple[str, str | None]]:
@@ -301,10 +296,10 @@ def by_class(counts: Counts) -> Counter[tuple[str, str | None]]:
 def main() -> None:
     """Print the figures."""
     road = hour()
-    true, errors = truth_of(road)
     with tempfile.TemporaryDirectory() as name:
         folder, begin = Path(name), time.perf_counter()
-        counts = write_page(road, folder / "review")
+        survey = write_page(road, folder / "review")
+        counts, true, errors = survey.counts, survey.true, survey.errors(road)
         page = folder / "review" / PAGE_NAME
         print(f"{len(counts.events)} counted, {len(true.events)} true, {len(errors)} errors")
         print(f"page: {page.stat().st_size / 1e6:.1f} MB, {time.perf_counter() - begin:.0f} s")
