@@ -222,10 +222,10 @@ def _expected(mistake: ErrorDetails, key: Key) -> str:
 
 def _unknown(key: Key, section: type[Section]) -> str:
     """Return a hint: the key of a section that is probably meant, or all keys."""
-    keys = section.model_fields
+    keys = section.keys()
     problem = "unknown setting"
     if "kind" in keys:
-        problem += f" of {key[0]}.kind: {keys['kind'].default}"
+        problem += f" of {key[0]}.kind: {section.model_fields['kind'].default}"
     if close := difflib.get_close_matches(str(key[-1]), keys, n=1):
         return f"{problem}; did you mean {close[0]}?"
     return f"{problem}; known settings: {', '.join(keys)}"

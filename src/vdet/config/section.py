@@ -24,6 +24,11 @@ class Section(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
+    @classmethod
+    def keys(cls) -> tuple[str, ...]:
+        """Return the keys as users write them."""
+        return tuple(field.alias or name for name, field in cls.model_fields.items())
+
     @model_validator(mode="before")
     @classmethod
     def _mark_unknown(cls, values: Any) -> Any:
@@ -34,7 +39,7 @@ class Section(BaseModel):
         if not isinstance(values, dict | None):
             return values
         marked: dict[str, Any] = {}
-        known = cls.model_fields
+        known = cls.keys()
         for key, value in (values or {}).items():
             if new_name := cls.renamed.get(key):
                 logging.getLogger(__name__).warning("%s: is deprecated; use %s", key, new_name)
