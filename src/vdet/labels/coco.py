@@ -65,7 +65,7 @@ class _Writer:
         ids = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
         sides = {"bbox": [x, y, width, height], "area": width * height, "segmentation": []}
         values = {"category_id": category, **sides, "iscrowd": 0, "score": round(score, 4)}
-        self.add("annotations", **ids, **values, **more)
+        self.add("annotations", **ids, **{**values, **more})
 
     def category(self, name: str) -> int:
         """Return the id of a category, and add it if it is new."""
@@ -114,6 +114,8 @@ def write_coco_images(file: BinaryIO, images: Sequence[ImageTracks]) -> None:
         for track in image.tracks:
             category = writer.category(track.class_name or UNKNOWN)
             writer.add_box(number, track.box, category, track.score)
+        for box in image.ignored:
+            writer.add_box(number, box, writer.category("ignore region"), 1.0, iscrowd=1)
     writer.end(file)
 
 

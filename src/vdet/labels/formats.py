@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import OutputError, TruthError
 from vdet.labels.label import SavedFinding, SavedTracks, Size, SourceVideo
@@ -21,12 +22,14 @@ from vdet.track.track import FrameTracks, Track
 class ImageTracks:
     """The vehicles in a single image.
 
-    `path` is its name in the file of labels, `size` its width and height in pixels.
+    `path` is its name in the file of labels, `size` its width and height in pixels. `ignored` are
+    ignore regions.
     """
 
     path: Path
     size: Size
     tracks: Sequence[Track]
+    ignored: Sequence[Box] = ()
 
 
 @dataclass(frozen=True, slots=True)

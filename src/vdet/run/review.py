@@ -3,12 +3,10 @@
 from pathlib import Path
 
 from vdet.boxes import NO_BOXES
-from vdet.config.classes import is_chosen
 from vdet.errors import VideoError
 from vdet.files import OutputFiles
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
-from vdet.regions import Regions
 from vdet.run.result import FrameResult
 from vdet.run.scene import saved_frames
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
@@ -35,22 +33,15 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
             for frame in saved_frames(tracks, run, (info.width, info.height), info)
         }
         traffic = LiveTraffic(settings, info.width, info.height)
-        regions = Regions(settings.regions, info.width, info.height) if settings.regions else None
         context = SinkContext(files, settings, info, is_part=run.is_part, traffic=traffic)
         advance = steps("", reader.expected)
         count = 0
         with open_sinks(run.outputs, context) as sinks:
             for frame in reader:
                 saved = frames.get(frame.index, FrameTracks(frame.index, float(frame.time), ()))
-                shown = tuple(
-                    track
-                    for track in saved.tracks
-                    if is_chosen(track.class_name, settings.classes)
-                    and (regions is None or regions.contains(track.foot))
-                )
-                result = FrameResult(run.source, frame, NO_BOXES, shown, searched=False)
-                traffic.add(result.frame_tracks)
-                sinks.write(result)
+                traffic.add(saved)
+                result = FrameResult(run.source, frame, NO_BOXES, saved.tracks, searched=False)
+                sinks.write(result.of_classes(settings.classes))
                 advance(1)
                 count += 1
             if not count:

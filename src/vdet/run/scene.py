@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from vdet.media import Frame, VideoInfo
 from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
+from vdet.regions import Regions
+from vdet.run.steps import tracks_inside
 from vdet.run.video import Run, log, open_video
 from vdet.track.track import FrameTracks
 
@@ -92,7 +95,7 @@ def _spread(frames: Iterable[Frame]) -> list[Image]:
 def saved_frames(
     tracks: Path, run: Run, size: Size, video: VideoInfo | None = None
 ) -> list[FrameTracks]:
-    """Return the frames of a file of tracks in the part of a run.
+    """Return the frames of a file of tracks in the part of a run, with the vehicles in its regions.
 
     `size` is that of the frames, pixels. Without a video, the first frame of the file is the first
     one of the video. Raises `TruthError`, also if the tracks are of frames of another size.
@@ -106,4 +109,9 @@ def saved_frames(
     origin = float(video.start) if video else next((frame.time for frame in frames), 0.0)
     start = origin + float(run.start or 0)
     end = math.inf if run.end is None else origin + float(run.end)
-    return [frame for frame in frames if start <= frame.time < end]
+    regions = Regions(run.settings.regions, *size)
+    return [
+        replace(frame, tracks=tracks_inside(regions, frame.tracks))
+        for frame in frames
+        if start <= frame.time < end
+    ]
