@@ -137,7 +137,7 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
         facts = VideoFacts(
             seconds=600, frames=15000, vehicles=each, max_at_once=3, still=still, rows=rows
         )
-        summary = {"folder": f"clip{number:05}.page", **facts.model_dump()}
+        summary = {"page": f"clip{number:05}.page/page.html", **facts.model_dump()}
         written[f"day{number // 100}/clip{number:05}"] = summary
     write_index(written, path)
 

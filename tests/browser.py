@@ -56,9 +56,13 @@ class Browser:
                 raise AssertionError(error.read().decode()[:500]) from error
 
     def open(self, page: Path) -> None:
-        """Open a page of `vdet draw`, and wait until it is there."""
-        self._call("POST", f"{self._session}/url", {"url": page.resolve().as_uri()})
+        """Open a page of `vdet draw` or a review, and wait until it is ready."""
+        self.visit(page)
         self.wait("return document.body.dataset.ready === 'yes'")
+
+    def visit(self, page: Path) -> None:
+        """Open any page."""
+        self._call("POST", f"{self._session}/url", {"url": page.resolve().as_uri()})
 
     def run(self, script: str, *values: Any) -> Any:
         """Return what a script returns."""

@@ -55,7 +55,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert first.err.splitlines()[-1] == f"{out}: 2 files done, 1 failed"
     made = ["a.csv", "a.mp4", "a.page/page.html", "day2/b.csv", "day2/b.mp4"]
     assert names(out) == [*made, "day2/b.page/page.html", "index.html", "manifest.jsonl"]
-    error = f"<p><b>bad</b>: {clips}/bad.mp4: cannot be opened, is not a video"
+    error = f"<li><b>bad</b> failed: {clips}/bad.mp4: cannot be opened, is not a video"
     assert error in (out / "index.html").read_text()
     assert (frames_of(out / "a.mp4"), frames_of(out / "day2" / "b.mp4")) == (12, 6)
     model = model_file(NetworkSettings())

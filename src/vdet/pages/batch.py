@@ -1,4 +1,4 @@
-"""The page over the videos of a batch, and the table of vehicles on all pages.
+"""The pages over the videos of a batch, and the table of vehicles on all pages.
 
 `vehicles.js` filters and sorts the table in the browser.
 """
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -19,8 +19,14 @@ from vdet.pages.render import PAGE_NAME, link_to, render
 
 NO_STILL = "data:image/jpeg;base64,"
 """Thumbnail of a video without a frame."""
-_COLUMNS = ("id", "first", "seconds", "speed", "lines", "motion", "distance", "lane")
+_COLUMNS = (
+    *("id", "first", "seconds", "speed", "lines", "motion", "distance", "lane"),
+    *("side", "size"),
+)
 _UNKNOWN = (None, "")  # empty values
+Summaries = Mapping[str, Mapping[str, Any]]
+"""The `summary` of an output of each video, by its name; `page` is relative to its folder."""
+FactsT = TypeVar("FactsT", bound=BaseModel)
 
 
 class VehicleRow(BaseModel):
@@ -42,8 +48,11 @@ class VehicleRow(BaseModel):
         Whether it drove or stood, as in records; empty if unknown.
     distance, lane
         As in records; None if unknown.
-    picture
-        Address of its image relative to the page of its video; empty if there is none.
+    side, size
+        Where its largest box is in the picture: left, middle or right; near or far, by its width.
+    picture, clip
+        Address of its image, and of a clip that shows it, relative to the page of its video; empty
+        if there is none.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -58,7 +67,10 @@ class VehicleRow(BaseModel):
     motion: str = ""
     distance: float | None = None
     lane: int | None = None
+    side: str = ""
+    size: str = ""
     picture: str = ""
+    clip: str = ""
 
 
 class VideoFacts(BaseModel):
@@ -66,7 +78,8 @@ class VideoFacts(BaseModel):
 
     `seconds` is the duration of the processed part, `max_at_once` the maximum number of vehicles
     at a time. `counts` are by name, `conditions` are reasons to doubt them; `still` is a thumbnail
-    as a data URI. The player of its page begins at `start`, seconds in the video.
+    as a data URI. The player of its page begins at `start`, seconds in the video. `review` is the
+    address of the review of its counts relative to its page, if there is one.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -80,6 +93,15 @@ class VideoFacts(BaseModel):
     counts: dict[str, int] = {}
     conditions: tuple[str, ...] = ()
     rows: tuple[VehicleRow, ...] = ()
+    review: str = ""
+
+
+class ReviewFacts(BaseModel):
+    """What the list of reviews shows of one: its key in the storage of the browser, and numbers."""
+
+    key: str
+    vehicles: int
+    minutes: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +123,10 @@ class Part:
     start: float
     rows: Sequence[VehicleRow]
 
-    @property
-    def folder(self) -> str:
-        """Prefix of the addresses of images."""
-        return (self.page or "").removesuffix(PAGE_NAME)
+    def addresses(self, column: str) -> list[str]:
+        """Return the addresses in a column of the rows, relative to the page of the table."""
+        folder = (self.page or "").removesuffix(PAGE_NAME)
+        return [getattr(row, column) and folder + getattr(row, column) for row in self.rows]
 
 
 def table_json(parts: Sequence[Part]) -> str:
@@ -117,9 +139,8 @@ def table_json(parts: Sequence[Part]) -> str:
         "class": [row.class_name or UNKNOWN for row in rows],
         **{name: [getattr(row, name) for row in rows] for name in _COLUMNS},
         "clock": [_plain_seconds(row.clock) for row in rows],
-        "picture": [
-            row.picture and part.folder + row.picture for part in parts for row in part.rows
-        ],
+        "picture": [address for part in parts for address in part.addresses("picture")],
+        "clip": [address for part in parts for address in part.addresses("clip")],
     }
     table = {
         "names": [part.name for part in parts],
@@ -144,21 +165,45 @@ def _plain_seconds(clock: str | None) -> int | None:
     return round(datetime.fromisoformat(clock).replace(tzinfo=UTC).timestamp())
 
 
-def write_index(videos: Mapping[str, Mapping[str, Any]], target: Path) -> None:
-    """Write the page over many videos, from the folder of each page and its `VideoFacts`.
+@dataclass(frozen=True, slots=True)
+class _Listed(Generic[FactsT]):
+    """A video in a list, with the address of its page."""
+
+    name: str
+    address: str
+    facts: FactsT
+
+
+def _listed(videos: Summaries, facts: type[FactsT]) -> list[_Listed[FactsT]]:
+    """Return the videos that did not fail."""
+    return [
+        _Listed(name, link_to(Path(name).parent / values["page"], Path()), facts(**values))
+        for name, values in videos.items()
+        if "error" not in values
+    ]
+
+
+def _errors(videos: Summaries) -> dict[str, str]:
+    return {name: values["error"] for name, values in videos.items() if "error" in values}
+
+
+def write_index(videos: Summaries, target: Path) -> None:
+    """Write the page over many videos, from the `page` of each and its `VideoFacts`.
 
     A video that failed has its `error` instead.
     """
-    failed, linked = {}, []
-    for name, values in videos.items():
-        if "error" in values:
-            failed[name] = values["error"]
-            continue
-        page = Path(name).parent / values["folder"] / PAGE_NAME
-        linked.append((name, link_to(page, Path()), VideoFacts(**values)))
-    counts = sum((Counter(facts.counts) for _, _, facts in linked), Counter[str]())
-    parts = [Part(name, page, facts.start, facts.rows) for name, page, facts in linked]
+    listed = _listed(videos, VideoFacts)
+    counts = sum((Counter(video.facts.counts) for video in listed), Counter[str]())
+    parts = [
+        Part(video.name, video.address, video.facts.start, video.facts.rows) for video in listed
+    ]
     html = render(
-        "index.html", videos=linked, failed=failed, counts=counts, table=table_json(parts)
+        "index.html", videos=listed, failed=_errors(videos), counts=counts, table=table_json(parts)
     )
     write_text(target, html)
+
+
+def write_reviews(videos: Summaries, target: Path) -> None:
+    """Write the list of reviews of many videos, from the `page` of each and its `ReviewFacts`."""
+    listed = _listed(videos, ReviewFacts)
+    write_text(target, render("reviews.html", videos=listed, failed=_errors(videos)))

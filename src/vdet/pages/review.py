@@ -2,7 +2,7 @@
 
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TextIO
@@ -81,6 +81,12 @@ class Review:
     bands: Sequence[Band]
     pictures: Sequence[StripPicture]
     marks: Sequence[Mark]
+    written: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+
+    @property
+    def key(self) -> str:
+        """The key of what was checked in the storage of the browser."""
+        return f"vdet review {self.video.path.name} {self.written}"
 
     def data(self) -> dict[str, Any]:
         """Return the values for the script of the page."""
@@ -109,7 +115,7 @@ class Review:
             "video": video.path.name,
             "size": [video.width, video.height],
             "start": float(video.start),
-            "written": datetime.now(UTC).isoformat(timespec="seconds"),
+            "written": self.written,
             "lines": lines,
             "zones": zones,
             "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],

@@ -31,6 +31,8 @@ from vdet.traffic.speeds import KMH
 _MAX_VEHICLES = 300  # in the timeline, and with pictures
 _DOUBT = "#f3d9a4", "#333"  # colours of the row with doubtful times
 _STOOD = {"standing": "standing", "unknown": "not seen moving"}
+_SIDES = "left", "middle", "right"
+_NEAR = 0.1  # width of a near vehicle, as a fraction of the frame's
 _SMALL = 200  # longer side of the thumbnail on the page over many videos
 
 
@@ -85,6 +87,10 @@ class VideoPage:
         The lines and zones at which vehicles were counted.
     findings
         Reasons to doubt the results.
+    clips
+        By id, the address of a clip that shows a vehicle, as in `pictures`.
+    review
+        The address of the review of the counts; empty if the run writes none.
     """
 
     video: VideoInfo
@@ -101,6 +107,8 @@ class VideoPage:
     pictures: Mapping[int, str] = field(default_factory=dict)
     borders: Sequence[Border] = ()
     findings: Sequence[Finding] = ()
+    clips: Mapping[int, str] = field(default_factory=dict)
+    review: str = ""
 
     @property
     def facts(self) -> VideoFacts:
@@ -115,6 +123,7 @@ class VideoPage:
             counts=self._totals,
             conditions=tuple(item.text for item in self.findings if item.severity == "warning"),
             rows=self._rows(self.pictures),
+            review=self.review,
         )
 
     @property
@@ -150,7 +159,10 @@ class VideoPage:
                 motion=record.motion or "",
                 distance=None if record.distance is None else round(record.distance, 1),
                 lane=record.lane,
+                side=_SIDES[min(2, int(3 * record.largest.center[0] / record.frame_width))],
+                size="near" if record.largest.width > _NEAR * record.frame_width else "far",
                 picture=pictures.get(record.id, ""),
+                clip=self.clips.get(record.id, ""),
             )
             for record in self.records
         )

@@ -13,22 +13,25 @@ data.counts.forEach((count, video) => {
 });
 const known = new Set(Object.keys(data));
 if (data.names.length < 2) known.delete("video");
-for (const name of ["lines", "motion", "speed", "distance", "lane", "clock", "picture"]) {
+for (const name of ["lines", "motion", "side", "size", "speed", "distance", "lane", "clock", "picture", "clip"]) {
   data[name] ??= new Array(data.class.length).fill(null);
 }
 
-// Columns: heading, text of a cell, and what rows are sorted by (numbers sort with nulls last).
+// Columns: heading, text of a cell, its link, and what rows are sorted by (numbers sort with nulls last).
 const columns = [
   { name: "id", text: i => `#${data.id[i]}`, key: i => data.id[i] },
   { name: "class", text: i => data.class[i], key: i => data.class[i] },
   { name: "video", text: i => data.names[data.video[i]], key: i => data.video[i], used: "video" },
-  { name: "time", text: timeText, key: i => data.clock[i] ?? data.first[i], link: true },
+  { name: "time", text: timeText, key: i => data.clock[i] ?? data.first[i], link: moment },
   { name: "seconds", text: i => data.seconds[i].toFixed(1), key: i => data.seconds[i] },
   { name: "km/h", text: i => number(data.speed[i]), key: i => data.speed[i], used: "speed" },
   { name: "lines", text: i => data.lines[i], key: i => data.lines[i], used: "lines" },
   { name: "lane", text: i => data.lane[i] ?? "–", key: i => data.lane[i], used: "lane" },
   { name: "metres", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
   { name: "motion", text: i => data.motion[i], key: i => data.motion[i], used: "motion" },
+  { name: "side", text: i => data.side[i], key: i => data.side[i], used: "side" },
+  { name: "size", text: i => data.size[i], key: i => data.size[i], used: "size" },
+  { name: "clip", text: i => data.clip[i] && "clip", key: i => data.clip[i], link: i => data.clip[i], used: "clip" },
 ].filter(column => !column.used || known.has(column.used));
 
 const form = document.getElementById("filters");
@@ -61,6 +64,12 @@ function timeText(i) {
   return `${Math.floor(seconds / 3600)}:${pad(Math.floor(seconds / 60) % 60)}:${pad(seconds % 60)}`;
 }
 
+// Return the address of the first moment of a vehicle in the page of its video; null without a player.
+function moment(i) {
+  const page = data.pages[data.video[i]];
+  return page === null ? null : `${page}#t=${Math.max(0, data.first[i] - data.starts[data.video[i]]).toFixed(3)}`;
+}
+
 // Return the row numbers that pass all filters. Filters that are empty are skipped.
 function filtered() {
   const values = Object.fromEntries(new FormData(form));
@@ -72,12 +81,14 @@ function filtered() {
     if (low) tests.push(i => column[i] === null ? null : column[i] >= Number(low));
     if (high) tests.push(i => column[i] === null ? null : column[i] <= Number(high));
   };
-  const moment = value => value && String(Date.parse(`${value}Z`) / 1000);
-  ["class", "lines", "motion", "lane"].forEach(choice);
+  const clockTime = value => value && String(Date.parse(`${value}Z`) / 1000);
+  const inSeconds = value => value && String(value.split(":").reduce((sum, part) => 60 * sum + Number(part), 0));
+  ["class", "lines", "motion", "side", "size", "lane"].forEach(choice);
   for (const name of ["seconds", "speed", "distance"]) {
     limits(data[name], values[`${name}-min`], values[`${name}-max`]);
   }
-  limits(data.clock, moment(values.from), moment(values.until));
+  limits(data.first, inSeconds(values["first-min"]), inSeconds(values["first-max"]));
+  limits(data.clock, clockTime(values.from), clockTime(values.until));
   if (values.video) {
     const part = values.video.toLowerCase();
     const named = data.names.map(name => name.toLowerCase().includes(part));
@@ -108,12 +119,11 @@ function sorted(found) {
 
 function cell(column, i) {
   const element = document.createElement("td");
-  const address = data.pages[data.video[i]];
-  if (column.link && address !== null) {
+  const address = column.link?.(i);
+  if (address) {
     const link = element.appendChild(document.createElement("a"));
-    const moment = Math.max(0, data.first[i] - data.starts[data.video[i]]).toFixed(3);
-    link.href = `${address}#t=${moment}`;
-    if (!address) link.dataset.time = moment;
+    link.href = address;
+    if (address.startsWith("#t=")) link.dataset.time = address.slice(3);
     link.textContent = column.text(i);
   } else {
     element.textContent = column.text(i);
@@ -183,7 +193,7 @@ function fill(name) {
 const head = document.querySelector("#found thead tr");
 if (known.has("picture")) head.append(document.createElement("th"));
 head.append(...columns.map(heading));
-["class", "lines", "motion"].forEach(fill);
+["class", "lines", "motion", "side", "size"].forEach(fill);
 const lanes = [...new Set(data.lane)].filter(lane => lane !== null).sort((a, b) => a - b);
 form.elements.lane.append(...lanes.map(lane => new Option(lane)));
 for (const element of form.querySelectorAll("[data-needs]")) {

@@ -24,12 +24,14 @@ from vdet.media.images import coarse_scale, encode_image, is_image_name, shrunk
 from vdet.media.writer import is_marked
 from vdet.pages.batch import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
+from vdet.pages.review import PAGE_NAME as REVIEW_NAME
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import Regions
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS, draw_tracks
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic.clock import Span, extend
+from vdet.traffic.clock import Clock, Span, extend
+from vdet.traffic.live import LiveTraffic
 from vdet.traffic.records import BestCrops, Crop, VehicleRecord
 
 log = logging.getLogger("vdet")
@@ -148,7 +150,7 @@ class PageSink(BaseSink):
         """Write the page."""
         self._keep(self._crops.end())
         page = self._page()
-        self.summary = {"folder": self.path.name, **page.facts.model_dump()}
+        self.summary = {"page": f"{self.path.name}/{PAGE_NAME}", **page.facts.model_dump()}
         write_text(self._file, page.html())
 
     def write(self, result: FrameResult) -> None:
@@ -182,6 +184,8 @@ class PageSink(BaseSink):
             pictures=self._pictures(),
             borders=counter.borders if counter else (),
             findings=findings_in(self.context.facts).items,
+            clips=self._clips(),
+            review=self._review(),
         )
 
     def _poster(self) -> Image | None:
@@ -194,6 +198,24 @@ class PageSink(BaseSink):
         largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
         reduced = shrunk(image, coarse_scale(largest, height))
         return np.asarray(cv2.resize(reduced, (width, height)), np.uint8)  # marks are drawn on it
+
+    def _review(self) -> str:
+        """Return the address of the review of the counts, if this run writes one."""
+        folders = self._paths_of("review")
+        return link_to(folders[0] / REVIEW_NAME, self.path) if folders else ""
+
+    def _clips(self) -> dict[int, str]:
+        """Return the addresses of the clips of the vehicles, if this run writes them."""
+        traffic, margin = self.traffic, self.context.settings.clips.margin
+        return {
+            vehicle.id: link_to(folder / clip.name, self.path)
+            for folder in self._paths_of("clips")[:1]
+            for scene in scenes(counted_vehicles(traffic), margin)
+            for clip in self.context.files.staged_path(folder).glob(
+                scene.name(traffic.clock) + ".*"
+            )
+            for vehicle in scene.vehicles
+        }
 
     def _pictures(self) -> dict[int, str]:
         """Return the addresses of the images of `crops`, if this run writes them."""
@@ -222,7 +244,9 @@ class PageSink(BaseSink):
 
 
 _INDEX = BatchTotal("index", write_index, ".html", of_failed=lambda error: {"error": error})
-PAGE = SinkKind(PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX)
+PAGE = SinkKind(
+    PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX, is_last=True
+)
 
 
 _CLIP_NAME = re.compile(
@@ -238,6 +262,22 @@ class Scene:
     start: float
     end: float
     vehicles: tuple[VehicleRecord, ...]
+
+    def name(self, clock: Clock | None) -> str:
+        """Return the name of its clip, without suffix."""
+        first, *others = self.vehicles
+        moment = clock_text(int(first.first), hours=True).zfill(8).replace(":", "-")
+        if clock:
+            moment = clock.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
+        more = f"+{len(others)}" if others else ""
+        return f"clip-{moment}-{in_file_name(first.class_name)}-{first.id}{more}"
+
+
+def counted_vehicles(traffic: LiveTraffic) -> Sequence[VehicleRecord]:
+    """Return the vehicles that were counted; all without lines and zones."""
+    counts = traffic.counts()
+    counted = {event.id for event in counts.events} if counts else ()
+    return [record for record in traffic.vehicles if counts is None or record.id in counted]
 
 
 def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
@@ -275,8 +315,8 @@ class ClipSink(BaseSink):
         if _state(source) != self._state:
             log.warning("%s: changed during the run, so no clips were cut out of it", source)
             return
-        for scene in scenes(self._chosen(), self.context.settings.clips.margin):
-            name = self._name(scene)
+        for scene in scenes(counted_vehicles(self.traffic), self.context.settings.clips.margin):
+            name = scene.name(self.traffic.clock)
             try:
                 self._cut(scene, folder / name)
             except (OutputError, VideoError) as error:
@@ -300,21 +340,6 @@ class ClipSink(BaseSink):
         target = stem.with_name(f"{stem.name}.mp4")
         part = max(start - video.start, Fraction(0)), end - video.start
         return encode_part(video.path, *part, target, self.context.settings)
-
-    def _chosen(self) -> Sequence[VehicleRecord]:
-        counts, records = self.traffic.counts(), self.traffic.vehicles
-        if counts is None:
-            return records
-        counted = {event.id for event in counts.events}
-        return [record for record in records if record.id in counted]
-
-    def _name(self, scene: Scene) -> str:
-        (first, *others), when = scene.vehicles, self.traffic.clock
-        moment = clock_text(int(first.first), hours=True).zfill(8).replace(":", "-")
-        if when:
-            moment = when.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
-        more = f"+{len(others)}" if others else ""
-        return f"clip-{moment}-{in_file_name(first.class_name)}-{first.id}{more}"
 
 
 def _is_clip(path: Path) -> bool:

@@ -170,6 +170,8 @@ class SinkKind:
         Raises `OutputError` if an output cannot be written for another reason.
     total
         The file that a batch writes over all its videos.
+    is_last
+        Whether it finishes after the other sinks, because it links their files.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -182,6 +184,7 @@ class SinkKind:
     may_replace: Callable[[Path], bool] = lambda _: True
     check: Callable[[Path], object] = lambda _: None
     total: BatchTotal | None = None
+    is_last: bool = False
 
     @property
     def endings(self) -> Sequence[str]:
@@ -285,7 +288,8 @@ def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sink
     source = "images" if context.video is None else "videos"
     sinks = {}
     with ExitStack() as stack:
-        for output in outputs:
+        # What is opened first is closed last.
+        for output in sorted(outputs, key=lambda output: not sink_kind(output.sink).is_last):
             kind = sink_kind(output.sink)
             if kind.takes not in ("both", source):
                 raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")

@@ -14,9 +14,10 @@ from vdet.errors import OutputError
 from vdet.media import Picture
 from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
+from vdet.pages.batch import write_reviews
 from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, crop_name, write_review
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counts import Event
 from vdet.traffic.records import BestCrops, Crop
 from vdet.traffic.strips import (
@@ -186,6 +187,12 @@ class ReviewSink(BaseSink):
         )
         with self._file.open("w", encoding="utf-8", errors="backslashreplace") as file:
             write_review(file, review, Path(self._folder.name))
+        self.summary = {
+            "page": f"{self.path.name}/{PAGE_NAME}",
+            "key": review.key,
+            "vehicles": len({event.vehicle for event in counts.events}),
+            "minutes": len({picture.minute for picture in self._pictures}),
+        }
 
     def _marks(self, events: Sequence[Event]) -> list[Mark]:
         """Return where the counted events are."""
@@ -212,4 +219,5 @@ class ReviewSink(BaseSink):
         return marks
 
 
-REVIEW = SinkKind(ReviewSink, what="reviews", folder_pattern=PAGE_NAME, takes="videos")
+_LIST = BatchTotal("reviews", write_reviews, ".html", of_failed=lambda error: {"error": error})
+REVIEW = SinkKind(ReviewSink, what="reviews", folder_pattern=PAGE_NAME, takes="videos", total=_LIST)
