@@ -207,10 +207,12 @@ def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
     assert facts.rows == (
         VehicleRow(
             id=1, class_name=None, first=0.0, seconds=2.0, clock="2026-05-01T07:00:00+00:00",
-            lines="north → south", picture="../a.crops/vehicle-0001.jpg",
+            lines="north → south", side="left", size="near",
+            picture="../a.crops/vehicle-0001.jpg",
         ),
         VehicleRow(
-            id=2, class_name="truck", first=2.0, seconds=0.1, clock="2026-05-01T07:00:02+00:00"
+            id=2, class_name="truck", first=2.0, seconds=0.1, clock="2026-05-01T07:00:02+00:00",
+            side="left", size="far",
         ),
     )  # fmt: skip
 
@@ -242,7 +244,8 @@ def test_the_times_of_its_vehicles_seek_the_player(tmp_path: Path, player: Playe
     path.write_text(page(player=player).html().replace("</body>", reads), "utf-8")
     times = ["0.000", "2.000"] if player else [None, None]
     assert json.loads(title_in_chromium(path)) == [
-        [True, times[0], "#1\tvehicle\t0:00:00\t2.0"], [False, times[1], "#2\ttruck\t0:00:02\t0.1"],
+        [True, times[0], "#1\tvehicle\t0:00:00\t2.0\tleft\tnear"],
+        [False, times[1], "#2\ttruck\t0:00:02\t0.1\tleft\tfar"],
     ]  # fmt: skip
 
 

@@ -31,8 +31,8 @@ def test_checked_vehicles_are_labels_and_everything_else_is_ignored(
     road = draw_road(tmp_path, CARS, seconds=68)
     review, output = tmp_path / "c.yaml", tmp_path / "set"
     review.write_text(REVIEW)
-    export = ("review", road.video, "--tracks-from", road.tracks, "-c", road.settings)
-    export = (*export, "--corrections", review, "--export", output)
+    saved = ("review", road.video, "--tracks-from", road.tracks, "-c", road.settings)
+    export = (*saved, "--corrections", review, "--export", output)
     assert run(*export, code=0).out == f"{output}: written\n"
     settings = Settings()
     source = image_source(read_labelled_images(output, Roles.for_training(settings)), settings)
