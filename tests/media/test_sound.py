@@ -50,6 +50,39 @@ def test_sound_is_copied_bit_for_bit(
     assert warnings() == []
 
 
+@pytest.mark.parametrize(("codec", "suffix"), [("pcm_mulaw", "avi"), ("pcm_s16le", "mkv")])
+@pytest.mark.parametrize("rate", [44_100, 11_000])
+def test_sound_that_mp4_cannot_hold_is_encoded(
+    codec: str, suffix: str, rate: int, tmp_path: Path, warnings: Warnings
+) -> None:
+    source = tmp_path / f"in.{suffix}"
+    seconds = np.arange(rate) / rate
+    beep = np.sin(2 * np.pi * 440 * seconds) * (np.abs(seconds - 0.6) < 0.05)
+    with av.open(str(source), "w") as container:
+        video = container.add_stream("mpeg4", rate=25)
+        sound = container.add_stream(codec, rate=rate, layout="mono")
+        assert isinstance(video, av.VideoStream)
+        assert isinstance(sound, av.AudioStream)
+        video.width, video.height, video.pix_fmt = 64, 48, "yuv420p"
+        for _ in range(25):
+            image = av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="bgr24")
+            container.mux(video.encode(image))
+        samples = av.AudioFrame.from_ndarray(
+            (20_000 * beep).astype(np.int16)[np.newaxis], format="s16", layout="mono"
+        )
+        samples.sample_rate = rate
+        container.mux([*video.encode(None), *sound.encode(samples), *sound.encode(None)])
+    target = copy(source, tmp_path / "out.mp4")
+    with av.open(str(target)) as container:
+        assert container.streams.audio[0].codec_context.name == "aac"
+        frames = [(frame, frame.to_ndarray()[0]) for frame in container.decode(audio=0)]
+    times = np.concatenate([float(f.time or 0) + np.arange(f.samples) / f.rate for f, _ in frames])
+    loud = times[np.abs(np.concatenate([samples for _, samples in frames])) > 0.1]
+    assert (loud.min(), loud.max()) == pytest.approx((0.55, 0.65), abs=0.02)
+    assert times.max() == pytest.approx(1, abs=0.05)
+    assert warnings() == []
+
+
 def test_every_sound_stream_is_copied(tmp_path: Path) -> None:
     source = write_clip(tmp_path / "in.mkv", sounds=["aac", "libmp3lame"])
     target = copy(source, tmp_path / "out.mkv")

@@ -53,17 +53,6 @@ def test_subtitles_are_ignored(tmp_path: Path, process: Process) -> None:
     assert shown.warnings == []
 
 
-def test_sound_that_the_container_cannot_hold_is_left_out_with_a_warning(
-    tmp_path: Path, process: Process
-) -> None:
-    source = write_clip(tmp_path / "clip.avi", codec="mpeg4", sounds=["pcm_mulaw"])
-    shown = process(source)
-    assert_whole(shown, list(range(12)))
-    assert shown.sounds == {}
-    (warning,) = shown.warnings
-    assert "clip.avi: its audio (pcm_mulaw) is empty, or cannot go into mp4; left out" in warning
-
-
 def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(
     tmp_path: Path, process: Process
 ) -> None:

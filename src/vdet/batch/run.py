@@ -65,7 +65,7 @@ def make_plan(
     common
         A run with everything that all runs have in common. The paths of its outputs are the endings
         of their names, after the name of the video, such as `.csv`. An empty one stands for the
-        suffix of the video if the sink can write it, else for the first suffix of the sink.
+        first suffix of the sink.
     skip_existing
         Skip runs whose outputs all exist and are up to date by the manifest. All outputs of the
         other runs are made again; only outputs that vdet wrote are replaced.
@@ -134,7 +134,7 @@ def make_plan(
 
 def _named(output: Output, video: Path) -> Output:
     """Return an output named after a video; its path was the ending of the name."""
-    ending = output.path.name or sink_kind(output.sink).suffix_for(video)
+    ending = output.path.name or sink_kind(output.sink).endings[0]
     return replace(output, path=video.with_suffix(ending))
 
 

@@ -220,7 +220,7 @@ def _beside(source: Path) -> Path:
     from vdet.batch.inputs import DRAWN
     from vdet.run.sinks.protocol import sink_kind
 
-    return source.with_name(f"{source.stem}{DRAWN}{sink_kind('video').suffix_for(source)}")
+    return source.with_name(f"{source.stem}{DRAWN}{sink_kind('video').endings[0]}")
 
 
 def _process_video(run: "Run") -> bool:

@@ -27,10 +27,11 @@ _log = logging.getLogger("vdet")
 class AudioCopy:
     """Copies the packets of every audio stream of `source` to `target`, bit for bit.
 
-    Times stay relative to the video: second `origin` of the source becomes second 0 of the target.
-    Earlier packets are dropped, except one if the target can hide it (mp4 and mov), because a
-    decoder needs it to start. Damaged packets, and streams that the target does not support, are
-    dropped with a warning (logger "vdet"). Create it before anything is written to `target`.
+    Streams that the target does not support are encoded as AAC; so is PCM in mp4, which few
+    programs play. Times stay relative to the video: second `origin` of the source becomes second 0
+    of the target. Earlier packets are dropped, except one if the target can hide it (mp4 and mov),
+    because a decoder needs it to start. Damaged packets, and empty streams, are dropped with a
+    warning (logger "vdet"). Create it before anything is written to `target`.
 
     Raises
     ------
@@ -44,6 +45,7 @@ class AudioCopy:
         self._origin = origin
         self._can_hide = target.format.name != "matroska"
         self._dropped = 0  # packets
+        self._encoded: set[int] = set()  # streams, by their index in the source
         self._source = Demuxer(source)
         self._streams = self._add_streams()
         self._packets = self._shifted_packets()
@@ -73,12 +75,19 @@ class AudioCopy:
         streams, target = {}, self._target
         for stream in self._source.container.streams.audio:
             codec = stream.codec_context
-            if codec and codec.sample_rate and codec.name in target.supported_codecs:
+            if not (codec and codec.sample_rate):
+                name = codec.name if codec else "unknown codec"
+                _log.warning("%s: its audio (%s) is empty; left out", self._path, name)
+            elif codec.name in target.supported_codecs and not (
+                target.format.name == "mp4" and codec.name.startswith("pcm_")
+            ):
                 streams[stream.index] = target.add_stream_from_template(stream)
             else:
-                name = codec.name if codec else "unknown codec"
-                fault = f"its audio ({name}) is empty, or cannot go into {target.format.name}"
-                _log.warning("%s: %s; left out", self._path, fault)
+                rates = av.Codec("aac", "w").audio_rates or ()
+                rate = codec.sample_rate if codec.sample_rate in rates else _AAC_RATE
+                layout = "mono" if codec.channels == 1 else "stereo"
+                streams[stream.index] = target.add_stream("aac", rate, layout=layout)
+                self._encoded.add(stream.index)
         return streams
 
     def _shifted_packets(self) -> "Generator[Packet[Stream], None, None]":
@@ -93,11 +102,27 @@ class AudioCopy:
                 self._dropped += 1  # muxers reject times that do not increase
                 continue
             last[index] = dts
+            if index in self._encoded:
+                yield from self._encoded_packets(packet)
+                continue
             shift = round(self._origin / packet.time_base)
             packet.pts, packet.dts = pts - shift, dts - shift
             if packet.pts + (packet.duration or 0) * self._can_hide >= 0:
                 packet.stream = self._streams[index]
                 yield packet
+        for index in self._encoded:
+            yield from self._streams[index].encode(None)
+
+    def _encoded_packets(self, packet: "Packet[Stream]") -> "Iterator[Packet[Stream]]":
+        try:
+            frames = packet.decode()
+        except av.InvalidDataError:
+            frames, self._dropped = [], self._dropped + 1
+        for frame in frames:
+            if isinstance(frame, av.AudioFrame) and frame.pts is not None and frame.time_base:
+                frame.pts -= round(self._origin / frame.time_base)
+                if frame.pts >= 0:
+                    yield from self._streams[packet.stream_index].encode(frame)
 
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
@@ -107,6 +132,8 @@ _X264 = "b-adapt=0:scenecut=0:b-pyramid=none"
 tenth of a run and save 1 % of the file size; and no B-frames as references, for fewer frames in
 memory: files are 2 % larger.
 """
+_AAC_RATE = 48_000
+"""Samples a second of audio whose own rate AAC does not have."""
 _MARKED = "made by vdet"
 MARK = f"{_MARKED} {__version__}"
 """Comment in the metadata of every video that vdet writes."""

@@ -157,7 +157,7 @@ ENCODED = [(range(17, 34), range(45, 57)), ".mp4"]
         ("mkv", {"options": B_FRAMES | {"g": "10"}}, [(range(10, 40), range(40, 60)), ".mkv"]),
         ("flv", {"options": {"g": "20"}}, COPIES),
         ("avi", {"options": {"g": "20", "bf": "0"}}, COPIES),
-        ("avi", {"options": B_FRAMES | {"g": "10"}}, ENCODED),
+        ("avi", {"options": B_FRAMES | {"g": "10"}, "sounds": ["pcm_s16le"]}, ENCODED),
         ("avi", {"codec": "mpeg4", "sounds": ["adpcm_ms"]}, ENCODED),
         ("h264", {"options": {"g": "10"}}, ENCODED),
         ("y4m", {"codec": "wrapped_avframe"}, ENCODED),

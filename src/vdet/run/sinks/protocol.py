@@ -191,11 +191,6 @@ class SinkKind:
         """Allowed endings of the name of the output; empty for any."""
         return self.suffixes() if callable(self.suffixes) else self.suffixes
 
-    def suffix_for(self, video: Path) -> str:
-        """Return the ending of the output for a video: its own, if the sink can write it."""
-        is_allowed = not self.endings or video.suffix.lower() in self.endings
-        return video.suffix if is_allowed else self.endings[0]
-
     def takes_name(self, name: str) -> bool:
         """Return whether an output may have this name, without its folder."""
         if self.writes_standard_output and name == STANDARD_OUTPUT.name:
