@@ -120,7 +120,7 @@ def test_a_shipped_config_is_found_by_its_name_and_another_by_its_path(
     for name in ("no", "seed.yaml", "../configs/seed"):
         with pytest.raises(ConfigError) as error:
             find_config(name)
-        shipped = "default, project-camera, seed, svm"
+        shipped = "ahead, default, project-camera, seed, svm"
         assert str(error.value) == f"{name}: not found; shipped settings files are: {shipped}"
 
 

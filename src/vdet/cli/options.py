@@ -150,8 +150,8 @@ _configs_option = click.option(
     "configs",
     metavar="FILE",
     multiple=True,
-    help="Read settings from a YAML file, or from a shipped one: default, svm, seed or "
-    "project-camera. Can be repeated. Later files win.",
+    help="Read settings from a YAML file, or from a shipped one: default, svm, seed, "
+    "ahead or project-camera. Can be repeated. Later files win.",
 )
 _assignments_option = click.option(
     "--set",

@@ -114,6 +114,7 @@ class AudioCopy:
             yield from self._streams[index].encode(None)
 
     def _encoded_packets(self, packet: "Packet[Stream]") -> "Iterator[Packet[Stream]]":
+        """Yield a packet of the source as packets of AAC."""
         try:
             frames = packet.decode()
         except av.InvalidDataError:
