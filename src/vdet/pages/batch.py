@@ -173,6 +173,11 @@ class _Listed(Generic[FactsT]):
     address: str
     facts: FactsT
 
+    @property
+    def folder(self) -> str:
+        """Prefix of addresses that are relative to the page."""
+        return self.address.removesuffix(PAGE_NAME)
+
 
 def _listed(videos: Summaries, facts: type[FactsT]) -> list[_Listed[FactsT]]:
     """Return the videos that did not fail."""
