@@ -32,7 +32,7 @@ def test_checked_vehicles_are_labels_and_everything_else_is_ignored(
     review, output = tmp_path / "c.yaml", tmp_path / "set"
     review.write_text(REVIEW)
     saved = ("review", road.video, "--tracks-from", road.tracks, "-c", road.settings)
-    export = (*saved, "--corrections", review, "--export", output)
+    export: tuple[object, ...] = (*saved, "--corrections", review, "--export", output)
     assert run(*export, code=0).out == f"{output}: written\n"
     settings = Settings()
     source = image_source(read_labelled_images(output, Roles.for_training(settings)), settings)

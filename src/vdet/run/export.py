@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vdet.boxes import Box
 from vdet.errors import ConfigError
-from vdet.files import OutputFiles, check_output
+from vdet.files import OutputFiles
 from vdet.labels.coco import write_coco_images
 from vdet.labels.formats import ImageTracks
 from vdet.labels.label import Size
@@ -16,7 +16,7 @@ from vdet.progress import Steps
 from vdet.run.scene import saved_frames
 from vdet.run.video import Run
 from vdet.track.track import FrameTracks
-from vdet.traffic.corrections import Passage, read_corrections
+from vdet.traffic.corrections import read_corrections
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import class_of
 
@@ -34,20 +34,20 @@ def export_checked(run: Run, tracks: Path, folder: Path, steps: Steps) -> None:
     written.
     """
     settings, inputs = run.settings, run.inputs
-    corrections = read_corrections(run.corrections)
-    assert corrections
-    check_output(folder / LABELS_NAME, overwrite=run.overwrite, makes_folder=True, inputs=inputs)
+    reviews = read_corrections(run.corrections)
+    files = OutputFiles(overwrite=run.overwrite, inputs=inputs)
+    files.check(folder / LABELS_NAME, makes_folder=True)
     with (
         VideoReader(run.source, start=run.start, end=run.end, settings=settings.input) as reader,
-        OutputFiles(overwrite=run.overwrite, inputs=inputs) as files,
+        files,
     ):
         size, name = (reader.info.width, reader.info.height), run.source.name
         frames = {frame.index: frame for frame in saved_frames(tracks, run, size, reader.info)}
-        counts = count_frames(frames.values(), settings, size, corrections=corrections, name=name)
+        counts = count_frames(frames.values(), settings, size, corrections=reviews, name=name)
         checked = {
             (event.frame, event.id): class_of(event)
             for event in counts.events
-            if corrections.has_checked(Passage.of(event))
+            if any(review.has_checked(event) for review in reviews)
         }
         target, images = files.stage_folder(folder), []
         advance = steps("", reader.expected)
@@ -61,7 +61,8 @@ def export_checked(run: Run, tracks: Path, folder: Path, steps: Steps) -> None:
                 path.write_bytes(encode_image(frame.image, path))
                 images.append(image)
         if not images:
-            raise ConfigError(f"{corrections.source}: no counted vehicle was checked")
+            sources = ", ".join(review.source for review in reviews)
+            raise ConfigError(f"{sources}: no counted vehicle was checked")
         with (target / LABELS_NAME).open("wb") as file:
             write_coco_images(file, images)
 

@@ -239,7 +239,7 @@ class Corrections(Section):
         result._files = self._files + review._files
         return result
 
-    def has_checked(self, event: ReviewedEvent) -> bool:
+    def has_checked(self, event: ReviewedEvent | Event) -> bool:
         """Return whether the line was checked at the time of an event."""
         return any(
             span.line == event.name and span.start <= event.time < span.end for span in self.checked
