@@ -196,7 +196,8 @@ def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) 
             E_left E_through E_right E_U-turn E_all S_left S_through S_right S_U-turn S_all
         {first}  1 1 0 0 2 0 0 0 0 0 0 0 0 0 0
         {second} 0 0 0 0 0 0 0 0 0 0 0 1 0 0 1
-        {part}   0 0 0 0 0 0 0 0 0 0 0 0 0 0 0""".replace("\n            ", " ")
+        {part}   0 0 0 0 0 0 0 0 0 0 0 0 0 0 0
+        all - - - 1 1 0 0 2 0 0 0 0 0 0 1 0 0 1""".replace("\n            ", " ")
     )
 
 

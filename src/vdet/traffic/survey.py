@@ -175,6 +175,10 @@ class Survey:
             [*_interval(period), *(numbers[period.number, *turn] for turn in turns)]
             for period in intervals.periods
         ]
+        sums = [
+            sum(numbers[period.number, *turn] for period in intervals.periods) for turn in turns
+        ]
+        rows.append([_ALL, None, None, None, *sums])
         headings = [*_TIMES, *map(" ".join, turns)]
         return SheetTable(headings, rows) if arms else None
 
