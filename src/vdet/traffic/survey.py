@@ -27,7 +27,7 @@ _NOTES = f"""\
 part: there is no video in more than a second of the interval. Per hour: of the time observed.
 peak hour: the four successive quarters of an hour, all observed, with the most vehicles. Its \
 factor is this number divided by four times that of the busiest quarter.
-heavy: the share of trucks and buses.
+heavy: the share of trucks and buses. all flows: each vehicle once, at its first line or zone.
 flow: from the first line or zone of a vehicle to the last, in the interval of the first. \
 {NOWHERE}: it was counted at one only; turning movements leave it out.
 turning movement: N left is from the northern arm of the junction to the left."""
