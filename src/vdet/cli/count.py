@@ -14,9 +14,9 @@ from vdet.files import OutputFiles, output_errors, write_text
 
 if TYPE_CHECKING:
     from vdet.boxes import Image
-    from vdet.config.schema import Settings
     from vdet.run.sinks import Output
     from vdet.traffic.counts import Counts
+    from vdet.traffic.survey import Survey
 
 
 @command()
@@ -82,6 +82,7 @@ def count(
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.corrections import read_corrections
     from vdet.traffic.counting import count_files
+    from vdet.traffic.survey import Survey
 
     inputs = source.inputs(*tracks, *corrections, settings=settings)
     files = OutputFiles(overwrite=overwrite, inputs=inputs)
@@ -101,7 +102,7 @@ def count(
     with files:
         for output in outputs:
             with output_errors(output.path):
-                _write(output, files, videos, settings, scene)
+                _write(output, files, Survey(videos, settings), scene)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
     for name, result in videos.items():
         if result.corrected:
@@ -110,33 +111,27 @@ def count(
     return DOUBTFUL if strict and is_doubtful else 0
 
 
-def _write(
-    output: "Output",
-    files: OutputFiles,
-    videos: "Mapping[str, Counts]",
-    settings: "Settings",
-    scene: "Image | None",
-) -> None:
+def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image | None") -> None:
     """Write a table, a workbook or a page; `scene` is the picture of the settings."""
     from vdet.pages.counts import counts_page
     from vdet.pages.render import PAGE_NAME
     from vdet.pages.traffic import scene_picture
     from vdet.traffic.counts import joined_counts
     from vdet.traffic.output import counts_content, flows_content, is_workbook
-    from vdet.traffic.survey import Survey
     from vdet.traffic.tables import write_content
     from vdet.traffic.workbook import write_workbook
 
+    traffic = survey.settings.traffic
     if scene is not None:
-        scene = scene_picture(scene, settings.traffic, joined_counts(list(videos.values())))
+        scene = scene_picture(scene, traffic, joined_counts(survey.counts))
     if output.sink == "page":
-        path, page = files.stage_folder(output.path), counts_page(videos, settings, scene)
-        return write_text(path / PAGE_NAME, page)
+        page = files.stage_folder(output.path) / PAGE_NAME
+        return write_text(page, counts_page(survey, scene))
     path = files.stage(output.path)
     if is_workbook(output.path):
-        return write_workbook(path, Survey(videos, settings).sheets(scene))
+        return write_workbook(path, survey.sheets(scene))
     content = {"counts": counts_content, "flows": flows_content}[output.sink]
-    return write_content(path, content(output.path, videos, settings.traffic.seconds))
+    return write_content(path, content(output.path, survey.videos, traffic.seconds))
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:

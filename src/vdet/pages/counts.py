@@ -1,11 +1,9 @@
 """The page of `vdet count`: all files of a camera, such as those of a day."""
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping
 from datetime import datetime, timedelta
 
 from vdet.boxes import Image
-from vdet.config.schema import Settings
 from vdet.errors import clock_text
 from vdet.pages.charts import Plot, interval_plot, time_axis
 from vdet.pages.render import Table, render
@@ -19,21 +17,18 @@ _INTERVAL = 900
 """Seconds of an interval of the chart, unless the settings have one."""
 
 
-def counts_page(
-    videos: Mapping[str, Counts], settings: Settings, picture: Image | None = None
-) -> str:
+def counts_page(survey: Survey, picture: Image | None = None) -> str:
     """Return the page; `picture` is the scene with lines and counts. Errors as for `Survey`."""
-    survey, counts = Survey(videos, settings), list(videos.values())
     facts = survey.facts()
     return render(
         "counts.html",
         title=facts.title,
         facts=_texts(facts)[1],
         volumes=_texts(survey.volumes()),
-        flows=flow_table(joined_counts(counts)),
+        flows=flow_table(joined_counts(survey.counts)),
         files=_texts(survey.files()),
         notes=_texts(survey.notes())[1],
-        plot=_plot(counts, settings.traffic.seconds or _INTERVAL),
+        plot=_plot(survey.counts, survey.settings.traffic.seconds or _INTERVAL),
         picture=picture,
     )
 

@@ -41,6 +41,11 @@ class Survey:
     videos
         The counts of its videos by their names.
 
+    Attributes
+    ----------
+    counts
+        Those of each video.
+
     Raises
     ------
     ConfigError
@@ -48,17 +53,17 @@ class Survey:
     """
 
     def __init__(self, videos: Mapping[str, Counts], settings: Settings) -> None:
-        self._videos, self._settings = videos, settings
-        self._counts, self._length = list(videos.values()), settings.traffic.seconds
-        self._classes = tables.class_columns(self._counts)
+        self.videos, self.settings = videos, settings
+        self.counts, self._length = list(videos.values()), settings.traffic.seconds
+        self._classes = tables.class_columns(self.counts)
         self._whole = self._intervals(None).periods[0]
-        events = (event for counts in self._counts for event in counts.events)
+        events = (event for counts in self.counts for event in counts.events)
         self._has_speeds = any(event.speed is not None for event in events)
 
     def sheets(self, picture: Image | None = None) -> list[Sheet]:
         """Return the sheets of the workbook; `picture` is the scene, as for `Sheet`."""
-        counted_rows = tables.count_table(self._counts, self._length)
-        flow_rows = tables.flow_table(self._counts, self._length)
+        counted_rows = tables.count_table(self.counts, self._length)
+        flow_rows = tables.flow_table(self.counts, self._length)
         single = {
             "Intervals": self._by_class(("line or zone", "direction"), counted_rows),
             "Flows": self._by_class(("from", "to"), flow_rows),
@@ -73,22 +78,22 @@ class Survey:
 
     def facts(self) -> SheetTable:
         """Return what the survey is, when and how it was made, and whether it is in doubt."""
-        survey, whole = self._settings.survey, self._whole
-        checks = [str(counts.corrected) for counts in self._counts if counts.corrected]
-        doubts = sum(len(counts.doubts + counts.warnings) for counts in self._counts)
-        clocks = dict.fromkeys(counts.clock.source for counts in self._counts if counts.clock)
+        survey, whole = self.settings.survey, self._whole
+        checks = [str(counts.corrected) for counts in self.counts if counts.corrected]
+        doubts = sum(len(counts.doubts + counts.warnings) for counts in self.counts)
+        clocks = dict.fromkeys(counts.clock.source for counts in self.counts if counts.clock)
         times = (time for time in (whole.start, whole.end) if isinstance(time, datetime))
         zones = dict.fromkeys(f"UTC{time.isoformat()[-6:]}" for time in times)
         facts: dict[str, Cell] = {
             "surveyor": survey.surveyor,
             "weather": survey.weather,
-            "files": counted(len(self._videos), "file"),
+            "files": counted(len(self.videos), "file"),
             "first frame": _time(whole.start),
             "last frame": _time(whole.end),
             "observed": timedelta(seconds=whole.observed),
             "time zone": ", ".join(zones) or None,
             "clock": ", ".join(clocks) or "unknown: times are those of the video",
-            "interval": self._settings.traffic.interval or "the whole time",
+            "interval": self.settings.traffic.interval or "the whole time",
             "checked": "; ".join(checks) or "no, counted automatically",
             "conditions": f"{counted(doubts, 'doubt')}, see Notes" if doubts else "no doubts",
             "program": f"vdet {__version__}",
@@ -102,12 +107,12 @@ class Survey:
         with suppress(ConfigError):  # there is no clock
             quarters = self._intervals(measures.QUARTER)
         groups: dict[tuple[str, str], list[tuple[int, Event]]] = {
-            direction: [] for counts in self._counts for direction in counts.directions
+            direction: [] for counts in self.counts for direction in counts.directions
         }
-        for index, counts in enumerate(self._counts):
+        for index, counts in enumerate(self.counts):
             for event in counts.events:
                 groups[event.name, event.direction].append((index, event))
-        flows = tables.vehicle_flows(self._counts)
+        flows = tables.vehicle_flows(self.counts)
         groups["all flows", ""] = [(index, first) for index, first, _ in flows]
         headings = "line or zone", "direction", *self._headings
         peak = ["peak hour", "vehicles in it", "peak hour factor"]
@@ -145,12 +150,12 @@ class Survey:
     def _headings(self) -> list[str]:
         """The headings of the numbers of vehicles."""
         classes = [*self._classes, "heavy, %"] if len(self._classes) > 1 else []
-        units = ["PCU"] if self._settings.traffic.pcu else []
+        units = ["PCU"] if self.settings.traffic.pcu else []
         return ["all vehicles", "per hour", *classes, *units]
 
     def _cells(self, numbers: Mapping[str, int], seconds: float) -> list[Cell]:
         """Return the cells below `_headings`, for vehicles of each class in seconds of video."""
-        total, units = sum(numbers.values()), self._settings.traffic.pcu
+        total, units = sum(numbers.values()), self.settings.traffic.pcu
         cells: list[Cell] = [total, tables.per_hour(total, seconds)]
         if len(self._classes) > 1:
             heavy = sum(numbers.get(name, 0) for name in measures.HEAVY)
@@ -162,10 +167,10 @@ class Survey:
 
     def _movements(self) -> SheetTable | None:
         """Return how vehicles turn, by interval; the arms are clockwise from the north."""
-        arm_of = {line.name: line.approach for line in self._settings.traffic.lines}
+        arm_of = {line.name: line.approach for line in self.settings.traffic.lines}
         arms = [arm for arm in measures.APPROACHES if arm in arm_of.values()]
         intervals, numbers = self._intervals(self._length), Counter[tuple[int, str, str]]()
-        for index, first, last in tables.vehicle_flows(self._counts):
+        for index, first, last in tables.vehicle_flows(self.counts):
             origin, destination = arm_of.get(first.name), arm_of.get(last.name) if last else None
             if origin and destination:
                 for turn in (measures.movement(origin, destination), _ALL):
@@ -186,7 +191,7 @@ class Survey:
         """Return the use of zones in each interval."""
         headings = "zone", "entered", "left", "mean", "max", "mean stay, s", "max stay, s"
         rows = []
-        for row in tables.zone_table(self._counts, self._length):
+        for row in tables.zone_table(self.counts, self._length):
             use = row.entered, row.left, row.mean, row.max, row.mean_stay, row.max_stay
             rows.append([*_interval(row), row.name, *use])
         return SheetTable([*_TIMES, *headings], rows) if rows else None
@@ -197,7 +202,7 @@ class Survey:
         measured = "class", "score", "seconds in the zone", "km/h", "mean km/h"
 
         def rows() -> Iterator[list[Cell]]:
-            for name, counts in self._videos.items():
+            for name, counts in self.videos.items():
                 for event in counts.events:
                     clock = counts.clock.at(event.time) if counts.clock else None
                     passage = event.name, event.direction, event.vehicle, class_of(event)
@@ -209,7 +214,7 @@ class Survey:
     def files(self) -> SheetTable:
         """Return when each file was recorded, how that is known, and how one follows another."""
         rows, before = list[list[Cell]](), None
-        for name, counts in self._videos.items():
+        for name, counts in self.videos.items():
             period = Intervals([(counts.clock, counts.spans)], None).periods[0]
             clock = counts.clock.source if counts.clock else "unknown"
             doubts = len(counts.doubts + counts.warnings)
@@ -223,16 +228,16 @@ class Survey:
         """Return the warnings and doubts of each file, and what the sheets mean."""
         rows: list[list[Cell]] = [
             [name, text]
-            for name, counts in self._videos.items()
+            for name, counts in self.videos.items()
             for text in (*counts.doubts, *counts.warnings)
         ]
-        units = [f"{name} {number:g}" for name, number in self._settings.traffic.pcu.items()]
+        units = [f"{name} {number:g}" for name, number in self.settings.traffic.pcu.items()]
         rows += [["", text] for text in _NOTES.splitlines()]
         rows += [["", f"PCU: {', '.join(units)}; others 1."]] if units else []
         return SheetTable(("file", "note"), rows)
 
     def _intervals(self, length: int | None) -> Intervals:
-        return Intervals([(counts.clock, counts.spans) for counts in self._counts], length)
+        return Intervals([(counts.clock, counts.spans) for counts in self.counts], length)
 
 
 def _time(value: ClockTime) -> Cell:
