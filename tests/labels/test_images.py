@@ -204,13 +204,6 @@ def test_images_in_other_folders_are_found_by_their_names(tmp_path: Path, name: 
         read_labelled_images(path)
 
 
-def test_boxes_in_percent_are_hinted_at(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    path = write_coco(tmp_path, {"a": Labelled(640, 480, (Boxed("car", (10, 20, 60, 70)),))})
-    read_labelled_images(path)
-    text = "no box reaches beyond pixel 100; COCO has pixels, no percentages"
-    assert caplog.messages == [f"{path}: {text}"]
-
-
 @pytest.mark.parametrize(
     ("key", "values", "words"),
     [

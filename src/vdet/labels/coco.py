@@ -28,7 +28,7 @@ from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.formats import Format, ImageTracks, last_classes
-from vdet.labels.images import LabelledImage, image_names, inside, log
+from vdet.labels.images import LabelledImage, image_names, inside
 from vdet.labels.label import NO_ID, Label, SavedTracks, Size, SourceVideo, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
@@ -222,11 +222,6 @@ def _read(path: Path, data: bytes) -> _Document:
     for entries in (document.images, document.categories):
         if len({entry.id for entry in entries}) < len(entries):
             raise TruthError(f"{path}: is not COCO: an id of images or categories occurs twice")
-    corners = [max(from_size(*entry.bbox)) for entry in document.annotations]
-    sides = [side for image in document.images for side in image.size or ()]
-    is_ours = any(video.vdet for video in document.videos)
-    if corners and max(corners) <= 100 and min(sides, default=0) > 2 * 100 and not is_ours:
-        log.warning("%s: no box reaches beyond pixel 100; COCO has pixels, no percentages", path)
     return document
 
 

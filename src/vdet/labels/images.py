@@ -18,7 +18,7 @@ from vdet.media.images import read_image
 _SLACK = 0.1
 """How far a box may extend beyond a side of the image, as a fraction of it."""
 
-log = logging.getLogger("vdet")
+_log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ def checked_images(
         )
     if repeated:
         duplicates = counted(repeated, "label")
-        log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
+        _log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
     return LabelledImages(
         name, tuple(checked.values()), dict(omitted.most_common()), dict(ignored.most_common())
     )

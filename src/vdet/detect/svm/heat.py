@@ -15,6 +15,7 @@ Viola & Jones merge detections ("Robust Real-Time Face Detection", 2004, section
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import cv2
 import numpy as np
@@ -210,7 +211,9 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) ->
     is_part: BoolArray = coverage(sides, sides) > _INSIDE
     is_part &= area(sides) > area(sides)[:, np.newaxis]
     is_part &= _FAR_STRONGER * position > position[:, np.newaxis]
-    return [vehicles[row].region for row in np.flatnonzero(~is_part.any(axis=1))]
+    keep = ~is_part.any(axis=1)
+    whole = [(Box.of(item.sides.tolist()), item.presence) for item in compress(vehicles, keep)]
+    return [HotRegion(box.rounded, box.center, presence) for box, presence in whole]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,11 +223,6 @@ class _Vehicle:
     sides: Float64Array
     position: float
     presence: float
-
-    @property
-    def region(self) -> HotRegion:
-        box = Box.of(self.sides.tolist())
-        return HotRegion(box.rounded, box.center, self.presence)
 
 
 def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
