@@ -10,9 +10,7 @@ from hostile.trials import try_files
 from labels.saving import car, frame, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
-from vdet.labels import coco
-from vdet.labels.lines import CSV as CSV_FORMAT
-from vdet.labels.lines import JSON_LINES, MOT
+from vdet.labels import coco, lines
 from vdet.labels.reading import read_tracks, read_truth
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
@@ -22,7 +20,7 @@ FRAMES = [
     for f in range(6)
 ]
 RESULTS, COCO, CSV, JSONL = (
-    written(form, FRAMES).decode() for form in (MOT, coco.COCO, CSV_FORMAT, JSON_LINES)
+    written(form, FRAMES).decode() for form in (lines.MOT, coco.COCO, lines.CSV, lines.JSON_LINES)
 )
 WORDS = (
     *("0", "-1", "1", "1e999", "-1e999", "nan", "inf", "1e-300", "10000000", "10000001"),

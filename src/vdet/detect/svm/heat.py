@@ -15,7 +15,6 @@ Viola & Jones merge detections ("Robust Real-Time Face Detection", 2004, section
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import compress
 
 import cv2
 import numpy as np
@@ -211,8 +210,8 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) ->
     is_part: BoolArray = coverage(sides, sides) > _INSIDE
     is_part &= area(sides) > area(sides)[:, np.newaxis]
     is_part &= _FAR_STRONGER * position > position[:, np.newaxis]
-    keep = ~is_part.any(axis=1)
-    whole = [(Box.of(item.sides.tolist()), item.presence) for item in compress(vehicles, keep)]
+    kept = [vehicles[row] for row in np.flatnonzero(~is_part.any(axis=1))]
+    whole = [(Box.of(vehicle.sides.tolist()), vehicle.presence) for vehicle in kept]
     return [HotRegion(box.rounded, box.center, presence) for box, presence in whole]
 
 

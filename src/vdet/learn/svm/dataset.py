@@ -83,7 +83,7 @@ def _find_in(source: Path) -> list[PatchFile]:
         names = [p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file()]
     else:
         names = root.root.namelist()
-    boxes = _read_table(root) if TABLE in names else {}
+    boxes = _read_table(source, root) if TABLE in names else {}
     files = [file for name in names if (file := _patch_file(source, name, boxes))]
     if not files:
         raise DataError(
@@ -148,8 +148,8 @@ def _content(root: _Root, name: str) -> bytes:
         return b""
 
 
-def _read_table(root: _Root) -> dict[str, Sides]:
-    """Return the sides of each patch in the table of a folder or zip file."""
+def _read_table(source: Path, root: _Root) -> dict[str, Sides]:
+    """Return the sides of each patch in the source's table."""
     try:
         text = _content(root, TABLE).decode("utf-8")
         rows = list(csv.reader(io.StringIO(text, newline="")))
@@ -157,7 +157,7 @@ def _read_table(root: _Root) -> dict[str, Sides]:
             raise ValueError(f"its first line is not {','.join(COLUMNS)}")
         return {name: _sides(values) for name, *values in rows[1:]}
     except (ValueError, csv.Error) as error:
-        raise DataError(f"{root}: {TABLE} is damaged ({error}); mine it again") from error
+        raise DataError(f"{source}: {TABLE} is damaged ({error}); mine it again") from error
 
 
 def _sides(values: Sequence[str]) -> Sides:
