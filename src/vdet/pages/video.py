@@ -134,7 +134,8 @@ class VideoPage:
     @property
     def _max_at_once(self) -> int:
         """The maximum number of vehicles at once."""
-        return 1 + max(charts.pack_rows(self._spans), default=-1)
+        spans = sorted((record.first, record.last) for record in self.records)
+        return 1 + max(charts.pack_rows(spans), default=-1)
 
     @property
     def _totals(self) -> dict[str, int]:
@@ -190,11 +191,6 @@ class VideoPage:
             paths=self._paths(),
             table=table_json([Part("", page, start, rows)]),
         )
-
-    @property
-    def _spans(self) -> list[tuple[float, float]]:
-        """When each vehicle is first and last shown, in order of their first times."""
-        return sorted((record.first, record.last) for record in self.records)
 
     @property
     def gaps(self) -> list[Span]:

@@ -115,7 +115,7 @@ def count_files(
             group = _Group(_all_classes(settings, corrections), frame_size, started)
         names[video.name] = saved.video.name if saved.video else None
         group.add(video, saved)
-        if clock and clock.has_whole_seconds:
+        if clock:  # else no file follows it
             video.last_frames = _last_frames(saved)
         advance(1)
     if not rate_is_used:
@@ -174,10 +174,10 @@ class _Video:
         What converts its times and the numbers of its frames to those of the group.
     spans
         As in `Counts`.
-    latest, step
-        Its latest frame, and the duration of that, seconds.
+    end, next_shift
+        The end of its last frame, and the `frame_shift` of the video after it.
     last_frames
-        The frames of its last seconds, if its clock has only whole seconds.
+        The frames of its last seconds, if it has a clock.
     """
 
     name: str
@@ -190,31 +190,9 @@ class _Video:
     shift: float = 0.0
     frame_shift: int = 0
     spans: tuple[Span, ...] = ()
-    latest: FrameTracks | None = None
-    step: float = _STEP
+    end: float = 0.0
+    next_shift: int = 0
     last_frames: Sequence[FrameTracks] = ()
-
-    @property
-    def end(self) -> float:
-        """The end of its last frame."""
-        last = round(self.latest.time, 6) if self.latest else self.first
-        return max(self.start, last + min(self.step, _SEAM))
-
-    @property
-    def next_shift(self) -> int:
-        """The `frame_shift` of the video after it."""
-        return self.frame_shift + (self.latest.index + 1 if self.latest else 0)
-
-    def add(self, frame: FrameTracks) -> None:
-        """Add the next frame."""
-        latest = self.latest.time if self.latest else -math.inf
-        if not latest <= frame.time < math.inf:
-            raise TruthError(
-                f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must increase"
-            )
-        if self.latest:
-            self.step = (frame.time - latest) / max(1, frame.index - self.latest.index)
-        self.latest = frame
 
     def counts(self, group: Counts) -> Counts:
         """Return those of its group that are of this video, at its times and frames."""
@@ -292,14 +270,26 @@ class _Group:
         if self.last:
             self._continue(self.last, video, frames)
         self._videos.append(video)
-        first_span = len(self.counter.spans)
+        latest: FrameTracks | None = None
+        first_span, step = len(self.counter.spans), _STEP
         for frame in frames:
-            video.add(frame)
+            before = latest or frame
+            if not before.time <= frame.time < math.inf:
+                raise TruthError(
+                    f"frame {frame.index}: {frame.time:g} s is before {before.time:g} s; times "
+                    "must increase"
+                )
+            if latest:
+                step = (frame.time - latest.time) / max(1, frame.index - latest.index)
+            latest = frame
             if frame.time >= video.start:
                 index, time = frame.index + video.frame_shift, frame.time + video.shift
                 self.counter.update(FrameTracks(index, time, frame.tracks))
                 if video.meter:
                     video.meter.add(frame)
+        last = round(latest.time, 6) if latest else video.first
+        video.end = max(video.start, last + min(step, _SEAM))
+        video.next_shift = video.frame_shift + (latest.index + 1 if latest else 0)
         video.spans = tuple(
             (round(first - video.shift, 6), round(last - video.shift, 6))
             for first, last in self.counter.spans[first_span:]

@@ -218,7 +218,10 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
     rows = rows[off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))]
     clean = _Geometry.of(ground, rows)
     rough, *_ = clean.lines(clean.positions)
-    middles = clean.middles(rough)
+    length, middles, along = math.nan, clean.positions, clean.along(rough)
+    if along is not None:
+        length = clean.length(along)
+        middles = clean.middles(along, length)
     velocities, _, deviations = clean.lines(middles)
     speeds, times = np.hypot(*velocities.T), clean.times
     at = np.arange(times[0], times[-1] + _SPACING, _SPACING)
@@ -229,7 +232,7 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
         speeds=speeds[kept],
         deviations=deviations[kept],
         common=_common(ground, rows),
-        length=clean.length(rough),
+        length=length,
     )
 
 
@@ -276,24 +279,18 @@ class _Geometry:
         away, depth = away / np.abs(row), depth * np.sign(row)
         return cls(rows[:, 0], positions, depth, away, pixel * rows[:, 3], weights)
 
-    def middles(self, velocities: Float64Array) -> Float64Array:
-        """Return the vehicle's centres on the road, metres, `(n, 2)`."""
-        along = self._along(velocities)
-        if along is None:
-            return self.positions
-        length = np.clip(self.length(velocities), *_LENGTHS)
-        extent = length * (along + _SLIMNESS * np.sqrt(np.maximum(0, 1 - along**2)))
+    def middles(self, along: Float64Array, length: float) -> Float64Array:
+        """Return the centres of a vehicle of this length on the road, metres, `(n, 2)`."""
+        across = np.sqrt(np.maximum(0, 1 - along**2))
+        extent = np.clip(length, *_LENGTHS) * (along + _SLIMNESS * across)
         return np.asarray(self.positions + self.away * extent[:, None] / 2)
 
-    def length(self, velocities: Float64Array) -> float:
-        """Return the vehicle's length by the widths of its box, metres; NaN if it never moves."""
-        along = self._along(velocities)
-        if along is None:
-            return math.nan
+    def length(self, along: Float64Array) -> float:
+        """Return the vehicle's length by the widths of its box, metres."""
         across = np.sqrt(np.maximum(0, 1 - along**2))
         return float(np.median(self.widths / (across + _SLIMNESS * along)))
 
-    def _along(self, velocities: Float64Array) -> Float64Array | None:
+    def along(self, velocities: Float64Array) -> Float64Array | None:
         """Return how much of its heading is away from the camera, 0 to 1 `(n,)`; None if unknown.
 
         While it stands, its heading is interpolated between those before and after.
