@@ -61,7 +61,7 @@ class LaneSettings(Shape):
 
 Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
-    "lane-geometry", "small-frames",
+    "lane-geometry", "small-frames", "traces",
 ]  # fmt: skip
 """What makes a result doubtful; docs/conditions.md explains each."""
 
@@ -85,7 +85,7 @@ class ConditionSettings(Section):
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
     """Codes of findings to suppress: camera-moves, camera-moved, unexplained-motion, dark, haze,
-    blur, drops, lane-geometry, small-frames.
+    blur, drops, lane-geometry, small-frames, traces.
     """
 
 

@@ -17,6 +17,7 @@ from vdet.pages.render import TEMPLATES, render
 from vdet.traffic.counts import Event, class_of
 from vdet.traffic.estimate import draw_minutes, strata_of
 from vdet.traffic.strips import Band
+from vdet.traffic.traces import Trace
 
 PAGE_NAME = "review.html"
 _PICTURES = "<!-- pictures -->"
@@ -81,6 +82,7 @@ class Review:
     bands: Sequence[Band]
     pictures: Sequence[StripPicture]
     marks: Sequence[Mark]
+    traces: Sequence[Trace]
     written: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
 
     @property
@@ -121,6 +123,14 @@ class Review:
             "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],
             "pictures": [asdict(picture) for picture in self.pictures],
             "marks": marks,
+            "traces": [
+                {
+                    "band": self.bands.index(trace.band),
+                    "seconds": round(trace.time - float(video.start), 3),
+                    "position": round(trace.place, 3),
+                }
+                for trace in self.traces
+            ],
             "classes": [*OUR_NAMES, *sorted(unlisted)],
             **self._sampling(),
         }

@@ -57,6 +57,8 @@ class FrameResult:
     searched
         Whether the detector searched the frame: see `detector.searches_per_second`. Without a
         search there are no detections.
+    unselected
+        The tracks of classes that are not selected; empty if all are.
     """
 
     source: Path
@@ -65,6 +67,7 @@ class FrameResult:
     tracks: tuple[Track, ...]
     facts: Facts = field(default_factory=dict)
     searched: bool = True
+    unselected: tuple[Track, ...] = ()
 
     @property
     def road(self) -> "Road | None":
@@ -79,8 +82,9 @@ class FrameResult:
 
     def of_classes(self, classes: Collection[str]) -> "FrameResult":
         """Return the result with only the tracks of some classes; empty for all."""
-        chosen = (track for track in self.tracks if is_chosen(track.class_name, classes))
-        return replace(self, tracks=tuple(chosen)) if classes else self
+        chosen = tuple(track for track in self.tracks if is_chosen(track.class_name, classes))
+        rest = (track for track in self.tracks if not is_chosen(track.class_name, classes))
+        return replace(self, tracks=chosen, unselected=tuple(rest)) if classes else self
 
     def _repr_png_(self) -> bytes:
         """Return the frame with its vehicles, for notebooks."""

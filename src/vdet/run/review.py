@@ -7,10 +7,10 @@ from vdet.errors import VideoError
 from vdet.files import OutputFiles
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
-from vdet.run.result import FrameResult
+from vdet.run.result import FrameResult, findings_in
 from vdet.run.scene import saved_frames
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
-from vdet.run.video import Run
+from vdet.run.video import Run, log
 from vdet.track.track import FrameTracks
 from vdet.traffic.live import LiveTraffic
 
@@ -47,3 +47,5 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
             if not count:
                 raise VideoError(f"{run.source}: no frames at these times; check them")
             traffic.end()
+        for warning in str(findings_in(context.facts)).splitlines():
+            log.warning("%s: %s", run.source, warning)

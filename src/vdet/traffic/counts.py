@@ -17,6 +17,8 @@ from vdet.traffic.crossings import APPEAR, ENTER
 if TYPE_CHECKING:
     import pandas as pd
 
+    from vdet.traffic.traces import Trace
+
 Direction = tuple[str, str]
 """Name of a line or zone, and of a direction."""
 
@@ -189,6 +191,8 @@ class Counts:
         The names of the lines and zones at which flows neither begin nor end.
     classes
         The classes of vehicles that can be counted; those of tracks may be others.
+    traces
+        What passed without a track, if strips were searched for it.
     """
 
     events: tuple[Event, ...]
@@ -199,6 +203,7 @@ class Counts:
     warnings: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     corrected: Corrected | None = None
+    traces: "tuple[Trace, ...]" = ()
     outside_flows: tuple[str, ...] = ()
     classes: tuple[str, ...] = ()
 

@@ -1,6 +1,6 @@
 """Records, counts and speeds of a video while it is processed."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 if TYPE_CHECKING:
     from vdet.traffic.corrections import Corrections
+    from vdet.traffic.traces import Trace
 
 
 class LiveTraffic:
@@ -72,6 +73,11 @@ class LiveTraffic:
         if self._final or self.counter is None:
             return self._final
         return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
+
+    def add_traces(self, traces: "Sequence[Trace]") -> None:
+        """Add what passed without a track to the counts, after `end`."""
+        if self._final:
+            self._final = replace(self._final, traces=tuple(traces))
 
     def end(self, *, is_still: bool = False, doubts: tuple[str, ...] = ()) -> None:
         """Make records and counts, after the last frame.

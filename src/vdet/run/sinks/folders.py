@@ -245,7 +245,7 @@ class PageSink(BaseSink):
 
 _INDEX = BatchTotal("index", write_index, ".html", of_failed=lambda error: {"error": error})
 PAGE = SinkKind(
-    PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX, is_last=True
+    PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX, finish_order=1
 )
 
 

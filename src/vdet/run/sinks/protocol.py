@@ -57,7 +57,8 @@ class SinkContext:
         Counts and speeds up to the latest result, and the records of vehicles, which are known when
         sinks finish; None for single images.
     facts
-        Results of steps about the whole video, by name; empty before sinks finish.
+        Results of steps about the whole video, by name; empty before sinks finish. Sinks that
+        finish first may add to them.
     places
         For single images: their paths below the input folders.
     stage_images
@@ -170,8 +171,9 @@ class SinkKind:
         Raises `OutputError` if an output cannot be written for another reason.
     total
         The file that a batch writes over all its videos.
-    is_last
-        Whether it finishes after the other sinks, because it links their files.
+    finish_order
+        Sinks with a lower number finish first: -1 finds facts and counts that others write, 1 links
+        the files of others.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -184,7 +186,7 @@ class SinkKind:
     may_replace: Callable[[Path], bool] = lambda _: True
     check: Callable[[Path], object] = lambda _: None
     total: BatchTotal | None = None
-    is_last: bool = False
+    finish_order: int = 0
 
     @property
     def endings(self) -> Sequence[str]:
@@ -284,7 +286,7 @@ def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sink
     sinks = {}
     with ExitStack() as stack:
         # What is opened first is closed last.
-        for output in sorted(outputs, key=lambda output: not sink_kind(output.sink).is_last):
+        for output in sorted(outputs, key=lambda output: -sink_kind(output.sink).finish_order):
             kind = sink_kind(output.sink)
             if kind.takes not in ("both", source):
                 raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")

@@ -3,21 +3,23 @@
 import tempfile
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from vdet.boxes import Image
+from vdet.conditions.traces import trace_findings
 from vdet.errors import OutputError
 from vdet.media import Picture
 from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
 from vdet.pages.batch import write_reviews
 from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, crop_name, write_review
-from vdet.run.result import FrameResult
+from vdet.run.result import CONDITIONS, FrameResult, findings_in
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Event
 from vdet.traffic.records import BestCrops, Crop
 from vdet.traffic.strips import (
@@ -30,6 +32,7 @@ from vdet.traffic.strips import (
     layers_of,
     sampling_of,
 )
+from vdet.traffic.traces import Trace, TraceSearch
 
 _MINUTE = 60
 _ENOUGH = 6
@@ -41,6 +44,8 @@ _COLUMN_ROWS = 800
 _CROP_SIDE = 120
 """Maximum side of the picture of a vehicle, pixels."""
 _QUALITY = 60
+_INTERVAL = 300
+"""Seconds of the intervals of findings about traces, unless the settings have some."""
 _SAME = 1.0
 """Maximum seconds between a counted crossing and the passage that gives its place."""
 
@@ -62,6 +67,7 @@ class _Strip:
     """
 
     band: Band
+    search: TraceSearch
     sampling: Sampling | None = None
     is_final: bool = False
     rows: list[tuple[float, Image]] = field(default_factory=list)
@@ -98,7 +104,9 @@ class ReviewSink(BaseSink):
         assert counter  # the settings have lines or zones
         self._file = context.files.stage_folder(path) / PAGE_NAME
         bands = bands_of((*counter.lines, *counter.zones))
-        self._strips = [_Strip(band) for band in bands]
+        self._strips = [_Strip(band, TraceSearch(band)) for band in bands]
+        self._tracks: list[FrameTracks] = []
+        self._traces: list[Trace] = []
         self._passages = Passages(bands)
         self._crops = BestCrops(is_coarse=context.settings.output.coarse)
         self._folder = tempfile.TemporaryDirectory()
@@ -116,15 +124,17 @@ class ReviewSink(BaseSink):
         """Add a frame to all strips."""
         seconds = max(0.0, float(result.frame.time) - self._start)
         if (minute := int(seconds // _MINUTE)) != self._minute:
-            self._end_minute()
+            self._end_minute(is_end=False)
             self._minute = minute
         self._coding = picture.planes.coding if (picture := result.frame.picture).planes else None
         self._passages.add(result.frame_tracks)
+        every = (*result.tracks, *result.unselected)
+        self._tracks.append(FrameTracks(result.frame.index, float(result.frame.time), every))
         for strip, passages in zip(self._strips, self._passages.found, strict=True):
             strip.add(seconds - _MINUTE * minute, picture, passages)
         self._write_crops(self._crops.add(result.frame_tracks, picture))
 
-    def _end_minute(self) -> None:
+    def _end_minute(self, *, is_end: bool) -> None:
         for number, (strip, passages) in enumerate(
             zip(self._strips, self._passages.found, strict=True)
         ):
@@ -132,9 +142,12 @@ class ReviewSink(BaseSink):
                 strip.decide(passages)
             if strip.rows and strip.sampling:
                 self._write_minute(number, strip, strip.sampling)
+                rows = [rows for _, rows in strip.rows]
+                self._traces += strip.search.search(self._tracks, rows, passages, is_end=is_end)
             strip.rows = []
             if not strip.is_final:
                 strip.sampling = None
+        self._tracks = []
 
     def _write_minute(self, number: int, strip: _Strip, sampling: Sampling) -> None:
         rate = sampling.rows * float(self.video.rate)  # rows a second
@@ -174,7 +187,8 @@ class ReviewSink(BaseSink):
 
     def finish(self) -> None:
         """Write the page."""
-        self._end_minute()
+        self._end_minute(is_end=True)
+        self._add_traces()
         self._write_crops(self._crops.end())
         counts = self.traffic.counts()
         assert counts
@@ -184,6 +198,7 @@ class ReviewSink(BaseSink):
             bands=[strip.band for strip in self._strips],
             pictures=self._pictures,
             marks=self._marks(counts.events),
+            traces=counts.traces,
         )
         with self._file.open("w", encoding="utf-8", errors="backslashreplace") as file:
             write_review(file, review, Path(self._folder.name))
@@ -193,6 +208,15 @@ class ReviewSink(BaseSink):
             "vehicles": len({event.vehicle for event in counts.events}),
             "minutes": len({picture.minute for picture in self._pictures}),
         }
+
+    def _add_traces(self) -> None:
+        """Add the traces to the counts, and the findings about them to the facts."""
+        settings, facts = self.context.settings, self.context.facts
+        self.traffic.add_traces(sorted(self._traces, key=lambda trace: trace.time))
+        counts, findings = self.traffic.counts(), findings_in(facts)
+        if counts and "traces" not in settings.conditions.ignore:
+            about_traces = trace_findings(counts, settings.traffic.seconds or _INTERVAL)
+            facts[CONDITIONS] = replace(findings, items=(*findings.items, *about_traces))
 
     def _marks(self, events: Sequence[Event]) -> list[Mark]:
         """Return where the counted events are."""
@@ -220,4 +244,11 @@ class ReviewSink(BaseSink):
 
 
 _LIST = BatchTotal("reviews", write_reviews, ".html", of_failed=lambda error: {"error": error})
-REVIEW = SinkKind(ReviewSink, what="reviews", folder_pattern=PAGE_NAME, takes="videos", total=_LIST)
+REVIEW = SinkKind(
+    ReviewSink,
+    what="reviews",
+    folder_pattern=PAGE_NAME,
+    takes="videos",
+    total=_LIST,
+    finish_order=-1,
+)
