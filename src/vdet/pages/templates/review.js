@@ -160,14 +160,23 @@ function labelOf(mark) {
   return `${way} ${classOf(mark)}${mark.id === undefined ? " +" : ` ${mark.id}`}`;
 }
 
+/** Return the traces of the minute at which no vehicle was added. */
+const tracesInMinute = () => data.traces.filter(trace => minuteOf(trace) === minute && !state.missed.some(mark =>
+  mark.band === trace.band && Math.abs(mark.seconds - trace.seconds) < 1 && Math.abs(mark.position - trace.position) < 0.1));
+
 function drawMarks() {
   for (const node of document.querySelectorAll(".mark")) node.remove();
-  for (const mark of inMinute()) {
-    const picture = data.pictures.find(item => item.band === mark.band && item.minute === minute);
-    const button = element("button", ["mark", ...Object.keys(mark.fixes), mark.key === selected ? "selected" : ""].join(" "), labelOf(mark));
-    button.dataset.key = mark.key;
-    button.title = `${mark.seconds.toFixed(2)} s, ${mark.direction}`;
-    button.onclick = () => { selected = mark.key; refresh(); };
+  for (const mark of [...tracesInMinute(), ...inMinute()]) {
+    const picture = data.pictures.find(item => item.band === mark.band && item.minute === minute), isTrace = !mark.key;
+    const kinds = isTrace ? ["trace"] : Object.keys(mark.fixes);
+    const button = element("button", ["mark", ...kinds, mark.key && mark.key === selected ? "selected" : ""].join(" "), isTrace ? "?" : labelOf(mark));
+    if (!isTrace) button.dataset.key = mark.key;
+    button.title = `${mark.seconds.toFixed(2)} s, ${isTrace ? "a trace without a vehicle: click to add one" : mark.direction}`;
+    button.onclick = () => {
+      if (isTrace) return addMissed(mark.band, mark.seconds, mark.position);
+      selected = mark.key;
+      refresh();
+    };
     if (!picture) {
       get("inside").append(button);
       continue;
