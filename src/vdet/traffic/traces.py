@@ -34,7 +34,7 @@ _WIDTH, _SECONDS, _AREA = 0.45, 0.4, 0.15
 """Minimum width, duration and area of a trace, as fractions of those of tracked vehicles there."""
 _LONGEST = 4
 """Maximum duration, as a multiple of the longest of tracked vehicles."""
-_NEAR = 7
+_NEAR = 5
 """Number of the nearest tracked vehicles that a trace is compared with."""
 _ENOUGH = 2
 """Minimum number of tracked vehicles that crossed."""
@@ -73,7 +73,7 @@ class _Crossing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Covers:
-    """Which part of a band is covered by tracked boxes, a row for each box that covers some.
+    """Which part of a band is covered by tracked boxes with their margin, a row for each box.
 
     `rows` are the frames, `starts` and `ends` fractions of the length of the band.
     """
@@ -84,13 +84,13 @@ class _Covers:
     ends: Float64Array
 
     @classmethod
-    def of(cls, band: Band, frames: Sequence[FrameTracks], margin: float = 0.0) -> "_Covers":
+    def of(cls, band: Band, frames: Sequence[FrameTracks]) -> "_Covers":
         tracks = [(row, track) for row, frame in enumerate(frames) for track in frame.tracks]
         rows = np.array([row for row, _ in tracks], np.int64)
         ids = np.array([track.id for _, track in tracks], np.int64)
         corners = [(box.x1, box.y1, box.x2, box.y2) for box in (track.box for _, track in tracks)]
         boxes = np.array(corners, np.float64).reshape(-1, 2, 2)
-        sides = margin * (boxes[:, 1] - boxes[:, 0])
+        sides = _MARGIN * (boxes[:, 1] - boxes[:, 0])
         boxes += np.stack([-sides, sides], axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):  # the band may be level or upright
             along = (boxes - band.start) / np.subtract(band.end, band.start)
@@ -107,6 +107,19 @@ class _Covers:
         for row, first, last in zip(self.rows, firsts, lasts, strict=True):
             covered[row, first:last] = True
         return covered
+
+    def crossings(self, passages: Sequence[Passage], times: Float64Array) -> list[_Crossing]:
+        """Return how the tracks of passages cross the band."""
+        crossings = []
+        for passage in passages:
+            boxes = np.flatnonzero(self.ids == passage.id)
+            if len(boxes):
+                first, last = times[self.rows[boxes[[0, -1]]]].tolist()
+                width = float((self.ends - self.starts)[boxes].max()) / (1 + 2 * _MARGIN)
+                seconds = (last - first + _step(times)) / (1 + 2 * _MARGIN)
+                passed = (passage.time - first) / seconds - _MARGIN
+                crossings.append(_Crossing(passage.place, width, seconds, passed))
+        return crossings
 
 
 class TraceSearch:
@@ -145,35 +158,24 @@ class TraceSearch:
         times = np.array([frame.time for frame in self._frames])
         until = np.inf if is_end else times[-1] - _DELAY
         recent = [item for item in passages if self._searched <= item.time < until]
-        self._crossings += self._crossings_of(recent, times)
-        traces = self._traces(times) if len(self._crossings) >= _ENOUGH else []
+        covers = _Covers.of(self._band, self._frames)
+        self._crossings += covers.crossings(recent, times)
+        traces = self._traces(covers, times) if len(self._crossings) >= _ENOUGH else []
         complete = [trace for trace in traces if self._searched <= trace.time < until]
         self._searched = until
         first = int(np.searchsorted(times, until - _DELAY))
         self._frames, self._rows = self._frames[first:], self._rows[first:]
         return complete
 
-    def _crossings_of(self, passages: Sequence[Passage], times: Float64Array) -> list[_Crossing]:
-        """Return how the tracks of passages cover the band."""
-        covers, crossings = _Covers.of(self._band, self._frames), []
-        for passage in passages:
-            rows = np.flatnonzero(covers.ids == passage.id)
-            if len(rows):
-                first, last = times[covers.rows[rows[[0, -1]]]]
-                width = float((covers.ends - covers.starts)[rows].max())
-                seconds = float(last - first) + _step(times)
-                passed = (passage.time - float(first)) / seconds
-                crossings.append(_Crossing(passage.place, width, seconds, passed))
-        return crossings
-
-    def _traces(self, times: Float64Array) -> list[Trace]:
+    def _traces(self, covers: _Covers, times: Float64Array) -> list[Trace]:
         """Return the traces in the frames at hand."""
         samples = self._band.samples
-        covered = _Covers.of(self._band, self._frames, _MARGIN).mask(len(times), samples)
+        covered = covers.mask(len(times), samples)
         places, widths, seconds, passed = np.array([astuple(item) for item in self._crossings]).T
         away = np.abs((np.arange(samples) + 0.5) / samples - places[:, np.newaxis])
         is_driven = (away <= widths[:, np.newaxis] / 2).any(axis=0)
-        differs = _differences(np.array(self._rows, np.float32), covered, times) > _DIFFERENT
+        strip = np.moveaxis(np.array(self._rows), 2, 0).astype(np.float32, order="C")
+        differs = _differences(strip, covered, times) > _DIFFERENT
         shape = int(np.median(widths) * samples / 4), int(np.median(seconds) / _step(times) / 4)
         kernel = np.ones((shape[1] | 1, shape[0] | 1), np.uint8)
         image = (differs & ~covered & is_driven).astype(np.uint8)
@@ -211,36 +213,36 @@ def _differences(strip: Float32Array, covered: BoolArray, times: Float64Array) -
     The best of five places of the background counts. Changes of the light are taken off.
     """
     background = _backgrounds(strip, covered, times)
-    light = _median((strip - background)[:, ::4], ~covered[:, ::4], axis=1)
-    strip = strip - np.clip(np.where(np.isinf(light), 0, light), -_MAX_GAIN, _MAX_GAIN)
-    padded = np.pad(background, ((0, 0), (_PLAY, _PLAY), (0, 0)), mode="edge")
-    moved = (padded[:, first : first + strip.shape[1]] for first in range(2 * _PLAY + 1))
-    differences = (np.abs(strip - other).max(axis=2) for other in moved)
-    return reduce(np.minimum, differences)
+    light = _median((strip - background)[..., ::4], ~covered[:, ::4], axis=-1)
+    strip = strip - np.clip(light, -_MAX_GAIN, _MAX_GAIN)
+    padded = np.pad(background, ((0, 0), (0, 0), (_PLAY, _PLAY)), mode="edge")
+    moved = (padded[..., first : first + strip.shape[-1]] for first in range(2 * _PLAY + 1))
+    return reduce(np.minimum, (np.abs(strip - other).max(axis=0) for other in moved))
 
 
 def _backgrounds(strip: Float32Array, covered: BoolArray, times: Float64Array) -> Float32Array:
-    """Return the background of each frame: that of its second, `(frames, samples, 3)`.
+    """Return the background of each frame: that of its second, `(3, frames, samples)`.
 
     Where a second has too few free frames, the background of the one before is used.
     """
     spread = np.linspace(0, len(times) - 1, 4 * _SAMPLES).astype(int)
-    background = _median(strip[spread], ~covered[spread], axis=0)[0]
+    background = _median(strip[:, spread], ~covered[spread], axis=-2)
     backgrounds = np.empty_like(strip)
     for second in np.arange(times[0], times[-1] + 1):
         ends = np.searchsorted(times, (second - _WINDOW / 2, second + _WINDOW / 2))
         rows = np.unique(np.linspace(ends[0], ends[1] - 1, _SAMPLES).astype(int))
         is_free = ~covered[rows]
-        latest = _median(strip[rows], is_free, axis=0)[0]
+        latest = _median(strip[:, rows], is_free, axis=-2)
         has_enough = is_free.sum(axis=0) >= _SAMPLES / 4
-        background = np.where(has_enough[:, np.newaxis], latest, background)
+        background = np.where(has_enough, latest, background)
         first, last = np.searchsorted(times, (second - 0.5, second + 0.5))
-        backgrounds[first:last] = background
+        backgrounds[:, first:last] = background
     return backgrounds
 
 
 def _median(values: Float32Array, is_known: BoolArray, axis: int) -> Float32Array:
-    """Return the median of the known values; infinite where there is none."""
-    ordered = np.sort(np.where(is_known[..., np.newaxis], values, np.inf), axis=axis)
-    middle = np.maximum(is_known.sum(axis=axis, keepdims=True) - 1, 0) // 2
-    return np.take_along_axis(ordered, middle[..., np.newaxis], axis=axis)
+    """Return the median of the known values along an axis, which stays; 0 where there is none."""
+    ordered = np.sort(np.where(is_known, values, np.inf), axis=axis)
+    count = is_known.sum(axis=axis, keepdims=True)
+    middle = np.take_along_axis(ordered, (np.maximum(count - 1, 0) // 2)[np.newaxis], axis=axis)
+    return np.where(count, middle, np.float32(0))
