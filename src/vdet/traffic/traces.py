@@ -18,9 +18,9 @@ from vdet.boxes import BoolArray, Float32Array, Float64Array, Image, Int64Array
 from vdet.track.track import FrameTracks
 from vdet.traffic.strips import Band, Passage
 
-_WINDOW = 5.0
+_WINDOW = 20.0
 """Seconds of which the median is the background; there is one for each second."""
-_SAMPLES = 16
+_SAMPLES = 24
 """Maximum number of frames of that median, and the minimum without a vehicle is a quarter."""
 _PLAY = 2
 """Columns by which the background may move along the line."""

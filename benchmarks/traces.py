@@ -1,0 +1,129 @@
+"""Traces on the drawn pole cameras, if some of the true tracks are taken away.
+
+    python -m benchmarks.traces          # all thirty scenes
+    python -m benchmarks.traces 6        # every sixth
+
+A tenth of the tracks that cross a line is taken away at random, with five seeds. A crossing of
+these is found if it has a trace; every other trace is false.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from benchmarks.drawn_traffic import as_planes
+from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
+from vdet.boxes import Image
+from vdet.synthetic.render import frames
+from vdet.track.track import FrameTracks
+from vdet.traffic.crossings import lines_and_zones
+from vdet.traffic.strips import Band, Passage, Passages, bands_of, layers_of, sampling_of
+from vdet.traffic.traces import Trace, TraceSearch
+
+MISSED = 0.1
+SEEDS = range(5)
+SECONDS, PLACE = 0.8, 0.15
+"""Maximum seconds, and fraction of the line, from a trace to the crossing that it shows."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a scene: its passages, and the pixels of its band in each frame."""
+
+    band: Band
+    passages: Sequence[Passage]
+    strip: Sequence[Image]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Number of crossings, of those taken away, of those that have a trace, and of false traces."""
+
+    crossings: int = 0
+    missed: int = 0
+    found: int = 0
+    false: int = 0
+
+    def __add__(self, other: "Outcome") -> "Outcome":
+        return Outcome(
+            crossings=self.crossings + other.crossings,
+            missed=self.missed + other.missed,
+            found=self.found + other.found,
+            false=self.false + other.false,
+        )
+
+    def __str__(self) -> str:
+        found, false = self.found / max(1, self.missed), 100 * self.false / max(1, self.crossings)
+        return (
+            f"{self.found} of {self.missed} missed have a trace ({found:.1%}); {self.false} false, "
+            f"{false:.1f} per 100 of {self.crossings}"
+        )
+
+
+def lines_of(scene: PoleScene, truth: Sequence[FrameTracks]) -> list[Line]:
+    """Return the lines of a scene with their strips."""
+    assert scene.settings.traffic
+    bands = bands_of(lines_and_zones(scene.settings.traffic, WIDTH, HEIGHT)[0])
+    passages = Passages(bands)
+    for frame in truth:
+        passages.add(frame)
+    pairs = list(zip(bands, passages.found, strict=True))
+    samplings = [sampling_of(band, found) for band, found in pairs]
+    strips: list[list[Image]] = [[] for _ in bands]
+    for drawn in frames(scene.scene):
+        layers = layers_of(as_planes(drawn).picture)
+        for strip, sampling in zip(strips, samplings, strict=True):
+            strip.append(sampling.cut(layers))
+    return [Line(*pair, strip) for pair, strip in zip(pairs, strips, strict=True)]
+
+
+def measured(line: Line, truth: Sequence[FrameTracks], missed: set[int]) -> Outcome:
+    """Return what is found at a line without some of the tracks."""
+    shown = [
+        replace(frame, tracks=tuple(track for track in frame.tracks if track.id not in missed))
+        for frame in truth
+    ]
+    counted = [passage for passage in line.passages if passage.id not in missed]
+    traces = TraceSearch(line.band).search(shown, line.strip, counted, is_end=True)
+    gone = [passage for passage in line.passages if passage.id in missed]
+    left = list(gone)
+    for trace in traces:
+        if same := min(
+            (passage for passage in left if _shows(trace, passage)),
+            key=lambda passage: abs(trace.time - passage.time),
+            default=None,
+        ):
+            left.remove(same)
+    found = len(gone) - len(left)
+    return Outcome(len(line.passages), len(gone), found, len(traces) - found)
+
+
+def _shows(trace: Trace, passage: Passage) -> bool:
+    is_near = abs(trace.time - passage.time) <= SECONDS
+    return is_near and abs(trace.place - passage.place) <= PLACE
+
+
+def main() -> None:
+    """Measure the scenes; print a row for each, and the total."""
+    step = int(sys.argv[1]) if len(sys.argv) > 1 else 1
+    total = Outcome()
+    for scene in islice(pole_scenes(), 0, None, step):
+        truth = list(scene.true_tracks())
+        lines = lines_of(scene, truth)
+        ids = sorted({passage.id for line in lines for passage in line.passages})
+        outcome = Outcome()
+        for seed in SEEDS:
+            count = max(1, round(MISSED * len(ids)))
+            missed = set(np.random.default_rng(seed).choice(ids, count, replace=False).tolist())
+            for line in lines:
+                outcome += measured(line, truth, missed)
+        print(f"{scene.name}: {outcome}", flush=True)
+        total += outcome
+    print(f"all: {total}")
+
+
+if __name__ == "__main__":
+    main()
