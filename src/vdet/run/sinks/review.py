@@ -127,9 +127,9 @@ class ReviewSink(BaseSink):
             self._end_minute(is_end=False)
             self._minute = minute
         self._coding = picture.planes.coding if (picture := result.frame.picture).planes else None
-        self._passages.add(result.frame_tracks)
         every = (*result.tracks, *result.unselected)
         self._tracks.append(FrameTracks(result.frame.index, float(result.frame.time), every))
+        self._passages.add(self._tracks[-1])
         for strip, passages in zip(self._strips, self._passages.found, strict=True):
             strip.add(seconds - _MINUTE * minute, picture, passages)
         self._write_crops(self._crops.add(result.frame_tracks, picture))
