@@ -87,7 +87,7 @@ def measured(line: Line, truth: Sequence[FrameTracks], missed: set[int]) -> Outc
         for frame in truth
     ]
     counted = [passage for passage in line.passages if passage.id not in missed]
-    traces = TraceSearch(line.band).search(shown, line.strip, counted, is_end=True)
+    traces = TraceSearch(0, line.band).search(shown, line.strip, counted, is_end=True)
     gone = [passage for passage in line.passages if passage.id in missed]
     left = list(gone)
     for trace in traces:

@@ -2,32 +2,30 @@
 
 from collections import Counter
 
-from vdet.conditions.finding import Finding, Severity
+from vdet.conditions.finding import Finding
 from vdet.errors import clock_text, counted
 from vdet.traffic.counts import Counts
 
 _MANY = 0.05
-"""Maximum number of traces without a warning, as a fraction of the counted vehicles."""
-_FEWEST = 2
-"""Minimum number of traces for a warning."""
+"""Maximum number of traces for a note instead of a warning, as a fraction of the vehicles."""
+_INTERVAL = 300
+"""Seconds of the intervals in which traces are counted."""
 
 
-def trace_findings(counts: Counts, interval: int) -> list[Finding]:
-    """Return a finding for each line or zone that has traces; `interval` is in seconds."""
+def trace_findings(counts: Counts) -> tuple[Finding, ...]:
+    """Return a finding for each line or zone with traces; a single one is no warning."""
     vehicles = Counter(event.name for event in counts.events)
     findings = []
-    for name, number in Counter(trace.band.name for trace in counts.traces).items():
-        times = (trace.time for trace in counts.traces if trace.band.name == name)
-        by_interval = Counter(int(time // interval) * interval for time in times)
-        (start, most), *_ = by_interval.most_common(1)
-        fraction = number / max(1, vehicles[name])
-        is_many = number >= _FEWEST and fraction > _MANY
+    for name, number in Counter(trace.name for trace in counts.traces).items():
+        times = [trace.time for trace in counts.traces if trace.name == name]
+        starts = Counter(int(time // _INTERVAL) * _INTERVAL for time in times)
+        [(start, most)] = starts.most_common(1)
         text = (
-            f"{name}: {counted(number, 'trace')} without a vehicle, {most} of them from "
-            f"{clock_text(start)} to {clock_text(start + interval)}; "
-            f"{counted(vehicles[name], 'vehicle')} counted"
+            f"{name}: {counted(number, 'trace')} without a vehicle, and {vehicles[name]} counted; "
+            f"{clock_text(start)} to {clock_text(start + _INTERVAL)}: {most}"
         )
-        spans = tuple((float(first), float(first + interval)) for first in sorted(by_interval))
-        severity: Severity = "warning" if is_many else "note"
-        findings.append(Finding("traces", text, spans, severity, fraction))
-    return findings
+        fraction = number / max(1, vehicles[name])
+        is_many = number > 1 and fraction > _MANY
+        spans = tuple((time, time) for time in times)
+        findings.append(Finding("traces", text, spans, "warning" if is_many else "note", fraction))
+    return tuple(findings)

@@ -123,14 +123,7 @@ class Review:
             "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],
             "pictures": [asdict(picture) for picture in self.pictures],
             "marks": marks,
-            "traces": [
-                {
-                    "band": self.bands.index(trace.band),
-                    "seconds": round(trace.time - float(video.start), 3),
-                    "position": round(trace.place, 3),
-                }
-                for trace in self.traces
-            ],
+            "traces": [asdict(trace) for trace in self.traces],
             "classes": [*OUR_NAMES, *sorted(unlisted)],
             **self._sampling(),
         }

@@ -8,15 +8,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vdet.config.shapes import NOWHERE
 from vdet.traffic import counts as tables
 from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow
 from vdet.traffic.tables import VIDEO, is_json, plain_time
-
-if TYPE_CHECKING:
-    from vdet.traffic.traces import Trace
 
 _HEADINGS = {
     "class_name": "class", "origin": "from", "destination": "to", "is_part": "part"
@@ -142,7 +139,7 @@ def _json(
         if video.corrected:
             by_video[name]["corrected"] = asdict(video.corrected)
         if video.traces:
-            by_video[name]["traces"] = [_trace(video, trace) for trace in video.traces]
+            by_video[name]["traces"] = [asdict(trace) for trace in video.traces]
         if events:
             rows = (_event(video, event) for event in video.events)
             by_video[name]["events"] = [dict(zip(_EVENTS, row, strict=True)) for row in rows]
@@ -157,11 +154,6 @@ def _is_table(path: Path, kind: str) -> bool:
 def _event(video: Counts, event: Event) -> list[Any]:
     time, *values = astuple(event)
     return [time, plain_time(video.clock and video.clock.at(time)), *values]
-
-
-def _trace(video: Counts, trace: "Trace") -> dict[str, Any]:
-    clock = plain_time(video.clock and video.clock.at(trace.time))
-    return {"time": trace.time, "clock": clock, "name": trace.band.name}
 
 
 def _items(columns: Sequence[str], rows: Iterable[Any]) -> list[dict[str, Any]]:

@@ -161,8 +161,9 @@ function labelOf(mark) {
 }
 
 /** Return the traces of the minute at which no vehicle was added. */
-const tracesInMinute = () => data.traces.filter(trace => minuteOf(trace) === minute && !state.missed.some(mark =>
-  mark.band === trace.band && Math.abs(mark.seconds - trace.seconds) < 1 && Math.abs(mark.position - trace.position) < 0.1));
+const tracesInMinute = () => data.traces.map(trace => ({ ...trace, seconds: trace.time - data.start })).filter(trace =>
+  minuteOf(trace) === minute && !state.missed.some(mark => mark.band === trace.band
+    && Math.abs(mark.seconds - trace.seconds) < 1 && Math.abs(mark.position - trace.position) < 0.1));
 
 function drawMarks() {
   for (const node of document.querySelectorAll(".mark")) node.remove();

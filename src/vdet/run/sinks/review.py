@@ -44,8 +44,6 @@ _COLUMN_ROWS = 800
 _CROP_SIDE = 120
 """Maximum side of the picture of a vehicle, pixels."""
 _QUALITY = 60
-_INTERVAL = 300
-"""Seconds of the intervals of findings about traces, unless the settings have some."""
 _SAME = 1.0
 """Maximum seconds between a counted crossing and the passage that gives its place."""
 
@@ -104,7 +102,9 @@ class ReviewSink(BaseSink):
         assert counter  # the settings have lines or zones
         self._file = context.files.stage_folder(path) / PAGE_NAME
         bands = bands_of((*counter.lines, *counter.zones))
-        self._strips = [_Strip(band, TraceSearch(band)) for band in bands]
+        self._strips = [
+            _Strip(band, TraceSearch(number, band)) for number, band in enumerate(bands)
+        ]
         self._tracks: list[FrameTracks] = []
         self._traces: list[Trace] = []
         self._passages = Passages(bands)
@@ -211,12 +211,11 @@ class ReviewSink(BaseSink):
 
     def _add_traces(self) -> None:
         """Add the traces to the counts, and the findings about them to the facts."""
-        settings, facts = self.context.settings, self.context.facts
+        facts, ignored = self.context.facts, self.context.settings.conditions.ignore
         self.traffic.add_traces(sorted(self._traces, key=lambda trace: trace.time))
         counts, findings = self.traffic.counts(), findings_in(facts)
-        if counts and "traces" not in settings.conditions.ignore:
-            about_traces = trace_findings(counts, settings.traffic.seconds or _INTERVAL)
-            facts[CONDITIONS] = replace(findings, items=(*findings.items, *about_traces))
+        if counts and "traces" not in ignored:
+            facts[CONDITIONS] = replace(findings, items=findings.items + trace_findings(counts))
 
     def _marks(self, events: Sequence[Event]) -> list[Mark]:
         """Return where the counted events are."""
