@@ -9,8 +9,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from browser import browser
+from conftest import Run as Invoke
 from red_cars import NullDetector
-from review_roads import CAR, HEIGHT, Car, draw_road, read_page
+from review_roads import CAR, HEIGHT, Car, draw_road, read_page, write_review
 from run.red_runs import outputs
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.loading import load_settings
@@ -164,3 +166,19 @@ def test_traces_are_in_the_page_the_counts_and_the_findings(
     again = replace(Run(road.video, files, ignoring), overwrite=True)
     totals = run_video(again, Parts(NullDetector(), _Known()))
     assert "traces" not in {item.code for item in findings_in(totals.facts).items}
+
+
+def test_a_click_on_a_trace_adds_a_missed_vehicle(tmp_path: Path, run: Invoke) -> None:
+    road = draw_road(tmp_path, _Known.cars[:7], missed=4, seconds=30)
+    page = write_review(run, tmp_path, road)
+    [trace] = read_page(page).data["traces"]
+    with browser(tmp_path) as window:
+        window.open(page)
+        assert window.run("return document.querySelectorAll('.mark').length") == 7
+        window.run("document.querySelector('.trace').click()")
+        assert window.run(
+            "return [document.querySelectorAll('.trace').length, inMinute().length]"
+        ) == [0, 7]
+        [added] = window.run("return state.added")
+    assert (added["line"], added["direction"]) == ("gate", "away")
+    assert (added["time"], added["place"]) == (pytest.approx(trace["time"]), trace["place"])
