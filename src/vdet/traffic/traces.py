@@ -194,4 +194,5 @@ def _differences(rows: Sequence[Image], is_free: BoolArray) -> Float32Array:
 def _median(values: Float32Array, is_known: BoolArray, axis: int) -> Float32Array:
     """Return the median of the known values along an axis, which stays; 0 where there is none."""
     masked = np.ma.array(values, mask=np.broadcast_to(~is_known, values.shape))
-    return np.asarray(np.ma.median(masked, axis=axis, keepdims=True).filled(0), np.float32)
+    median = np.ma.median(masked, axis=axis, keepdims=True)  # type: ignore[no-untyped-call]
+    return np.asarray(median.filled(0), np.float32)
