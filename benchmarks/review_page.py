@@ -248,7 +248,7 @@ class Survey:
         kinds = {**dict.fromkeys(road.missed, "missed"), **dict.fromkeys(road.renamed, "class")}
         events = [event for event in self.true.events if event.id in kinds]
         events += [event for event in self.counts.events if event.id in road.false]
-        positions = {passage.id: passage.place for passage in self.passages}
+        positions = {passage.id: passage.position for passage in self.passages}
         return [
             Error(
                 kind=kinds.get(event.id, "false"),

@@ -103,7 +103,7 @@ def measured(line: Line, truth: Sequence[FrameTracks], missed: set[int]) -> Outc
 
 def _shows(trace: Trace, passage: Passage) -> bool:
     is_near = abs(trace.time - passage.time) <= SECONDS
-    return is_near and abs(trace.place - passage.place) <= PLACE
+    return is_near and abs(trace.position - passage.position) <= PLACE
 
 
 def main() -> None:

@@ -87,7 +87,7 @@ def test_a_vehicle_without_a_track_is_a_trace(minute: float) -> None:
     assert len(traces) == 2
     for trace, shape in zip(traces, missed, strict=True):
         assert trace.time == pytest.approx(shape.time, abs=0.2)
-        assert trace.place == pytest.approx((shape.left + shape.width / 2) / SAMPLES, abs=0.02)
+        assert trace.position == pytest.approx((shape.left + shape.width / 2) / SAMPLES, abs=0.02)
 
 
 def test_a_vehicle_that_stands_for_some_seconds_is_one_trace() -> None:
@@ -117,7 +117,7 @@ def test_a_trembling_camera_and_changes_of_the_light_are_no_vehicles() -> None:
 
 
 class _Known:
-    """Follows all cars but two, at their true places."""
+    """Follows all cars but two, at their true positions."""
 
     cars: ClassVar = [
         Car(3 + 4 * number, 80 + 160 * (number % 2), number % 2 == 0) for number in range(12)
@@ -181,4 +181,4 @@ def test_a_click_on_a_trace_adds_a_missed_vehicle(tmp_path: Path, run: Invoke) -
         ) == [0, 7]
         [added] = window.run("return state.added")
     assert (added["line"], added["direction"]) == ("gate", "away")
-    assert (added["time"], added["place"]) == (pytest.approx(trace["time"]), trace["place"])
+    assert (added["time"], added["position"]) == (pytest.approx(trace["time"]), trace["position"])

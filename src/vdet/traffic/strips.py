@@ -80,7 +80,7 @@ class Passage:
     ----------
     id, time
         Of the track; seconds.
-    place
+    position
         Fraction of the length of the band, 0 to 1.
     velocity
         Movement of the foot, x and y, pixels a frame.
@@ -90,7 +90,7 @@ class Passage:
 
     id: int
     time: float
-    place: float
+    position: float
     velocity: Point
     width: float
 
@@ -126,10 +126,10 @@ class Passages:
         for band, found in zip(self._bands, self.found, strict=True):
             way = meeting((a, b), (band.start, band.end))
             if way is not None:
-                place = meeting((band.start, band.end), (a, b)) or 0.0
+                position = meeting((band.start, band.end), (a, b)) or 0.0
                 x, y = ((new - old) / (last - first) for new, old in zip(b, oldest, strict=True))
                 moment = before + way * (time - before)
-                found.append(Passage(track.id, moment, place, (x, y), track.box.width))
+                found.append(Passage(track.id, moment, position, (x, y), track.box.width))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,14 +202,14 @@ def layers_of(picture: Picture) -> tuple[Image, ...]:
 def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:
     """Return where the pixels of a band lie, for the traffic that passed it.
 
-    At each place the band follows the mean way of the traffic there, of the direction that most
+    At each position, the band follows the mean way of the traffic there, of the direction that most
     take, and is as wide as that moves in a frame. It has a row for each pixel of that, or fewer on
     long lines, where vehicles would be too long.
     """
     count, along = band.samples, np.subtract(band.end, band.start)
-    places = (np.arange(count) + 0.5) / count
-    velocities = _velocities(places, passages, along)
-    points = np.array(band.start) + places[:, np.newaxis] * along
+    positions = (np.arange(count) + 0.5) / count
+    velocities = _velocities(positions, passages, along)
+    points = np.array(band.start) + positions[:, np.newaxis] * along
     speeds = [float(np.hypot(*passage.velocity)) for passage in passages] or [2 * _SLOW]
     rows = int(np.clip(round(median(speeds) * min(1, _LONG * count / band.length)), 1, _MAX_ROWS))
     offsets = 0.5 - (np.arange(rows) + 0.5) / rows  # what is ahead has passed earlier
@@ -219,14 +219,14 @@ def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:
 
 
 def _velocities(
-    places: Float64Array, passages: Sequence[Passage], along: Float64Array
+    positions: Float64Array, passages: Sequence[Passage], along: Float64Array
 ) -> Float64Array:
-    """Return the movement in a frame at each place, pixels, `(n, 2)`."""
+    """Return the movement in a frame at each position, pixels, `(n, 2)`."""
     normal = np.array([along[1], -along[0]]) / np.hypot(*along)
     if not passages:
-        return np.tile(2 * _SLOW * normal, (len(places), 1))
+        return np.tile(2 * _SLOW * normal, (len(positions), 1))
     own = np.array([passage.velocity for passage in passages])
-    away = (places[:, np.newaxis] - [passage.place for passage in passages]) / _NEAR
+    away = (positions[:, np.newaxis] - [passage.position for passage in passages]) / _NEAR
     weights = 1 / (1 + away**4)
     sides = np.sign(own @ normal)
     most = np.where(weights @ sides >= 0, 1, -1)[:, np.newaxis]

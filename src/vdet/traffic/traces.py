@@ -49,24 +49,24 @@ class Trace:
     ----------
     band, name
         Number of the band from 0, and name of its line or zone.
-    time, place
+    time, position
         Seconds in the video, and fraction of the length of the band, 0 to 1.
     """
 
     band: int
     name: str
     time: float
-    place: float
+    position: float
 
 
 @dataclass(frozen=True, slots=True)
 class _Crossing:
-    """A tracked vehicle in a strip: place and width, columns, and number of frames.
+    """A tracked vehicle in a strip: position and width, columns, and number of frames.
 
     `passed` is when its foot passed, as a fraction of these frames.
     """
 
-    place: float
+    position: float
     width: float
     frames: float
     passed: float
@@ -112,14 +112,14 @@ class TraceSearch:
         for passage in passages:
             if self._searched <= passage.time < until and (ids == passage.id + 1).any():
                 row = int(np.searchsorted(times, passage.time))
-                place = passage.place * self._band.samples
-                self._crossings.append(_crossing(ids == passage.id + 1, row, place))
+                position = passage.position * self._band.samples
+                self._crossings.append(_crossing(ids == passage.id + 1, row, position))
         traces = []
         if len(self._crossings) >= _ENOUGH:
             for row, column in self._feet(ids == 0):
-                place = round(float(column) / self._band.samples, 3)
+                position = round(float(column) / self._band.samples, 3)
                 traces.append(
-                    Trace(self._number, self._band.name, round(float(times[row]), 3), place)
+                    Trace(self._number, self._band.name, round(float(times[row]), 3), position)
                 )
         complete = [trace for trace in traces if self._searched <= trace.time < until]
         self._searched = until
@@ -129,8 +129,8 @@ class TraceSearch:
 
     def _feet(self, is_free: BoolArray) -> Iterator[tuple[int, float]]:
         """Yield the row and column of the foot of each trace in the frames at hand."""
-        places, widths, frames, passed = np.array([astuple(item) for item in self._crossings]).T
-        away = np.abs(np.arange(self._band.samples) + 0.5 - places[:, np.newaxis])
+        positions, widths, frames, passed = np.array([astuple(item) for item in self._crossings]).T
+        away = np.abs(np.arange(self._band.samples) + 0.5 - positions[:, np.newaxis])
         is_driven = (away <= widths[:, np.newaxis] / 2).any(axis=0)
         differs = is_free & is_driven & (_differences(self._rows, is_free) > _DIFFERENT)
         gaps = np.ones((int(np.median(frames)) // 4 | 1, int(np.median(widths)) // 4 | 1), np.uint8)
@@ -138,7 +138,7 @@ class TraceSearch:
         _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
         shortest, longest = np.quantile(frames, _SHORT, method="lower"), frames.max()
         for label, (left, top, width, height, area) in enumerate(stats[1:].tolist(), start=1):
-            near = np.argsort(np.abs(places - left - width / 2))[:_NEAR]
+            near = np.argsort(np.abs(positions - left - width / 2))[:_NEAR]
             usual = np.median(widths[near])
             is_large = width >= _WIDTH * usual and area >= _AREA * usual * shortest
             if is_large and _DURATION * shortest <= height <= _LONGEST * longest:
@@ -168,18 +168,20 @@ def _ids(band: Band, frames: Sequence[FrameTracks]) -> Int64Array:
     return ids
 
 
-def _crossing(shown: BoolArray, row: int, place: float) -> _Crossing:
+def _crossing(shown: BoolArray, row: int, position: float) -> _Crossing:
     """Return how a vehicle crosses that covers a part of a strip, and whose foot is at a row."""
     rows = np.flatnonzero(shown.any(axis=1))
     width = shown.sum(axis=1).max() / (1 + 2 * _MARGIN)
     frames = (rows[-1] - rows[0] + 1) / (1 + 2 * _MARGIN)
-    return _Crossing(place, float(width), float(frames), float((row - rows[0]) / frames - _MARGIN))
+    return _Crossing(
+        position, float(width), float(frames), float((row - rows[0]) / frames - _MARGIN)
+    )
 
 
 def _differences(rows: Sequence[Image], is_free: BoolArray) -> Float32Array:
     """Return how far each pixel is from the background, levels, `(frames, samples)`.
 
-    The best of five places of the background counts. Changes of the light are taken off.
+    The best of five positions of the background counts. Changes of the light are taken off.
     """
     strip = np.moveaxis(np.array(rows), 2, 0).astype(np.float32, order="C")
     spread = np.linspace(0, len(rows) - 1, _SAMPLES).astype(int)

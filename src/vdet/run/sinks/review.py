@@ -231,7 +231,7 @@ class ReviewSink(BaseSink):
                 if strip.band.name == event.name and event.direction in strip.band.directions
             ]
             spots = [
-                _Spot(abs(passage.time - event.time), band, passage.place)
+                _Spot(abs(passage.time - event.time), band, passage.position)
                 for band in bands
                 for passage in by_band_and_id.get((band, event.id), ())
             ]
