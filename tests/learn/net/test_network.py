@@ -190,14 +190,12 @@ def test_what_was_learnt_is_found_again(
     network, _ = trained
     path = tmp_path / "net.onnx"
     export_network(network, Header(classes=CLASSES, pixels=256 * 128), path)
-    model = NetworkModel(
-        NetworkSettings(min_score=0.05, min_score_still=0.2, min_scores_still={}), path
-    )
+    model = NetworkModel(NetworkSettings(min_score=0.2), path)
     found = wanted = right_class = 0
     for seed in range(100, 120):
         sample = block_picture(seed)
         detector = model.for_video(256, 128, [sample.image])
-        detections = detector.detect(detector.search(Picture(sample.image), None))
+        detections = detector.detect(detector.search(Picture(sample.image), 0))
         assert detections.classes is not None
         names = [detections.names[class_] for class_ in detections.classes.tolist()]
         boxes = torch.tensor(detections.sides)
