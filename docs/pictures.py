@@ -18,7 +18,7 @@ from vdet.synthetic.scene import LANE_WIDTH, Body, Scene, SceneVehicle, Waypoint
 
 FOLDER = Path(__file__).parent
 COUNTED_FRAME = 62  # of the demo's pole: half of the vehicles are counted
-STAGES = ("1-windows", "2-hits", "3-heat", "4-boxes")
+STAGES = ("1-windows", "2-hits", "3-heat", "5-boxes")
 
 _SEED = 11
 _VAN = Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12)

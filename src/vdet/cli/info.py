@@ -68,11 +68,16 @@ def _machine() -> Facts:
     """Load the shipped models; any error of that is one of the installation."""
     from vdet.config.loading import load_settings, shipped_configs
     from vdet.detect.factory import load_detector
+    from vdet.detect.onnx.detector import SHIPPED
 
     configs = shipped_configs()
     for path in configs.values():
         load_detector(load_settings([path]).detector)
-    return {"vdet": f"{__version__}, on {core_count()} cores", "settings": list(configs)}
+    return {
+        "vdet": f"{__version__}, on {core_count()} cores",
+        "network": str(SHIPPED),
+        "settings": list(configs),
+    }
 
 
 def _camera(settings: "Settings") -> Facts:

@@ -12,7 +12,7 @@ from vdet.detect.svm.detector import SvmModel, blend_heat
 from vdet.detect.svm.heat import Heat
 from vdet.media import Picture
 
-NAMES = ["windows", "hits", "heat"]
+NAMES = ["windows", "hits", "heat", "threshold"]
 ROWS = SETTINGS.svm
 SMALLER_SET = scale_lengths(WindowSettings(size=24, overlap=0.5, top=100, bottom=160), SCALE)
 
@@ -62,3 +62,11 @@ class TestHeat:
         rows, columns = np.nonzero(blended.min(axis=2) > 190)
         assert set(rows.tolist()) == set(range(shrink, min(21, 2 * shrink)))
         assert set(columns.tolist()) == set(range(2 * shrink, min(30, 3 * shrink)))
+
+
+def test_what_is_not_hot_enough_is_darkened() -> None:
+    image = road(CAR)
+    threshold = pictures_of(image)["threshold"]
+    middle = int((CAR.y1 + CAR.y2) / 2), int((CAR.x1 + CAR.x2) / 2)
+    assert (threshold[middle] == image[middle]).all()
+    assert (threshold[-1, -1] == image[-1, -1] // 3).all()

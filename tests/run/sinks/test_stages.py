@@ -18,7 +18,7 @@ from vdet.media.images import read_image
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 
-NAMES = ["1-windows.png", "2-hits.png", "3-heat.png", "4-boxes.png"]
+NAMES = ["1-windows.png", "2-hits.png", "3-heat.png", "4-threshold.png", "5-boxes.png"]
 
 
 def detected(*boxes: Box, time: Fraction = Fraction(0), found: Road | None = None) -> FrameResult:
@@ -47,7 +47,7 @@ def test_pictures_are_made_of_the_first_frame_at_or_after_the_moment(tmp_path: P
 @pytest.mark.parametrize("lane", [None, LANE])
 def test_pictures_show_the_lane_where_it_is_looked_for(tmp_path: Path, lane: Lane | None) -> None:
     names = stages(tmp_path, Fraction(0), detected(found=replace(road_seen(LENS), lane=lane)))
-    assert names == [*NAMES, "5-road.png", "6-above.png", "7-mask.png", "8-fit.png"]
+    assert names == [*NAMES, "6-road.png", "7-above.png", "8-mask.png", "9-fit.png"]
 
 
 def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path: Path) -> None:

@@ -155,7 +155,7 @@ class SvmDetector:
         return self._shown_in_still(boxes) if is_still else boxes
 
     def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return three images of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
+        """Return images of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat, threshold."""
         trace = detections.trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()
         for number, grid in enumerate(self.grids):
@@ -168,7 +168,14 @@ class SvmDetector:
             draw_box(hits, hit_boxes[row], GREEN, f"{trace.hits.probabilities[row]:.2f}")
         heat = blend_heat(image, trace.heat)
         draw_label(heat, f"peak {trace.heat.peak:.1f}", (0, 0), WHITE)
-        return {"windows": windows, "hits": hits, "heat": heat}
+        threshold = self._settings.heat.threshold
+        hot = (trace.heat.values > threshold).astype(np.uint8).repeat(trace.heat.shrink, 0)
+        hot = hot.repeat(trace.heat.shrink, 1)[: len(image), : image.shape[1]]
+        contours, _ = cv2.findContours(hot, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        hot_parts = np.where(hot[..., np.newaxis], image, image // 3)
+        cv2.drawContours(hot_parts, contours, -1, GREEN, 2)
+        draw_label(hot_parts, f"heat above {threshold:g}", (0, 0), WHITE)
+        return {"windows": windows, "hits": hits, "heat": heat, "threshold": hot_parts}
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._settings.heat.threshold)
