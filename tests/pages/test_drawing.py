@@ -109,21 +109,21 @@ def test_a_line_is_drawn_dragged_named_saved_and_opened_again(
     window.type("l")
     window.click((200, 400), (500, 420))
     window.type("gate", ENTER)
-    assert "left 0 · right 2" in window.text("#list")
+    assert "up 0 · down 2" in window.text("#list")
     window.drag((500, 420), (700, 440), (1000, 400))
-    assert "left 0 · right 6" in window.text("#list")
+    assert "up 0 · down 6" in window.text("#list")
     window.type("s", CONTROL + "s")
     saved = downloaded(tmp_path, "gate.yaml")
     settings = load_settings([saved])
     [line] = settings.traffic.lines
-    assert (line.name, line.left, line.right) == ("gate", "right", "left")
+    assert (line.name, line.left, line.right) == ("gate", "down", "up")
     totals = count_frames(video, settings, (WIDTH, HEIGHT)).totals
-    assert [(total.direction, total.count) for total in totals] == [("right", 0), ("left", 6)]
+    assert [(total.direction, total.count) for total in totals] == [("down", 0), ("up", 6)]
     window.type(CONTROL + "z", CONTROL + "z", CONTROL + "z")
     assert window.text("#list").startswith("line 1")
     window.choose_file("#open", saved)
     window.wait("return document.getElementById('hint').textContent === 'Opened gate.yaml.'")
-    assert window.text("#list") == "gateright 0 · left 6"
+    assert window.text("#list") == "gatedown 0 · up 6"
     assert window.text("#text") == saved.read_text()
 
 
@@ -214,7 +214,7 @@ def test_a_finger_draws_on_a_small_screen(tmp_path: Path) -> None:
         assert window.run("return document.documentElement.scrollWidth") == 390
         window.type("l")
         window.drag((200, 400), (600, 420), (1000, 400), kind="touch")
-        assert "left 0 · right 6" in window.text("#list")
+        assert "up 0 · down 6" in window.text("#list")
 
 
 def test_what_a_file_has_already_is_carried_through(window: Browser, tmp_path: Path) -> None:

@@ -735,12 +735,20 @@ async function openPage(data) {
     drawMarks();
   }
 
+  /** Return the names of both sides of a new line as one sees them: where in the image vehicles go. */
+  function sideNames([x1, y1], [x2, y2]) {
+    const isUpright = Math.abs(y2 - y1) > Math.abs(x2 - x1);
+    const sides = isUpright ? ["left", "right"] : ["up", "down"], isReversed = isUpright ? y2 > y1 : x2 < x1;
+    const [left, right] = isReversed ? sides.reverse() : sides;
+    return { left, right };
+  }
+
   function endShape() {
     const points = drawn, kind = tool;
     if (points.length < (kind === "line" ? 2 : 3)) return;
     setTool("select");
     const [start, end] = points;
-    if (kind === "line") add("lines", { name: freeName("line"), start, end, left: "left", right: "right" });
+    if (kind === "line") add("lines", { name: freeName("line"), start, end, ...sideNames(start, end) });
     else if (kind === "zone") add("zones", { name: freeName("zone"), points });
     else add("regions", { name: freeName("region"), kind, points });
     get("field-name").select();
