@@ -1,11 +1,11 @@
 "use strict";
 // The page of `vdet review`. A mark is a counted crossing, or a vehicle that was missed. Its fixes say what is wrong with it:
 // false or missed (with null), class or direction (with what is correct). What a person changes is the state: the fixes of
-// counted marks by their key, missed vehicles, and the checked minutes. Seconds count from the first frame of the video.
+// counted marks by their key, missed vehicles, and the checked minutes. Seconds count from the first frame of
+// the video, times as in its tables.
 const MINUTE = 60;
 const data = JSON.parse(document.getElementById("data").textContent);
 const get = id => document.getElementById(id);
-const key = `vdet review ${data.video} ${data.written}`;
 const minuteOf = mark => Math.floor(mark.seconds / MINUTE);
 let state = { fixes: {}, missed: [], checked: [], reviewer: "", sample: null };
 let undone = []; // earlier states, as JSON
@@ -77,7 +77,7 @@ function addMissed(band, seconds, position) {
   selected = `m${state.missed.length}`;
   const rounded = Math.round(1000 * seconds) / 1000;
   change(() => state.missed.push({ band, seconds: rounded, position, line: data.bands[band].name,
-    time: Math.round(1000 * (seconds + data.start)) / 1000, direction, class: lastClass }));
+    direction, class: lastClass }));
 }
 
 function undo() {
@@ -92,9 +92,10 @@ const planned = () => state.sample?.minutes ?? data.minutes;
 
 function draw() {
   const count = Math.min(data.minutes.length, Number(get("count").value));
-  change(() => { state.sample = count >= 1 ? { seed: data.seed, minutes: data.order.slice(0, count) } : null; });
-  if (!planned().includes(minute)) [minute, selected] = [planned()[0], null];
-  refresh();
+  change(() => {
+    state.sample = count >= 1 ? { seed: data.seed, minutes: data.order.slice(0, count) } : null;
+    if (!planned().includes(minute)) [minute, selected] = [planned()[0], null];
+  });
 }
 
 function go(steps, isChecked) {
@@ -107,6 +108,7 @@ function go(steps, isChecked) {
 }
 
 // ---------------------------------------------------------------- the view
+const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
 const clock = seconds => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(0).padStart(2, "0")}`;
 
 function element(tag, className, text) {
@@ -116,10 +118,6 @@ function element(tag, className, text) {
   return node;
 }
 
-function lengthOf(picture) {
-  return Number(get("size").value) / data.bands[picture.band].samples; // screen pixels of a pixel of the strip
-}
-
 /** Return the address of a picture in the page. */
 const addressOf = name => `data:image/webp;base64,${get(name).textContent}`;
 
@@ -127,14 +125,14 @@ const addressOf = name => `data:image/webp;base64,${get(name).textContent}`;
 function drawStrips() {
   const strips = data.pictures.filter(picture => picture.minute === minute).map(picture => {
     const band = data.bands[picture.band], strip = element("div", "strip"), columns = element("div", "columns");
-    const scale = lengthOf(picture), address = `url("${addressOf(`strip-${picture.band}-${picture.minute}`)}")`;
+    const width = Number(get("size").value), height = picture.height * width / band.samples; // of a column, screen pixels
+    const address = `url("${addressOf(`strip-${picture.band}-${picture.minute}`)}")`;
     columns.dataset.band = picture.band;
     for (let number = 0; number < picture.columns; number++) {
       const column = element("div", picture.is_upward ? "column up" : "column"), view = element("i");
-      const width = band.samples * scale;
-      Object.assign(column.style, { width: `${width}px`, height: `${picture.height * scale}px` });
+      Object.assign(column.style, { width: `${width}px`, height: `${height}px` });
       Object.assign(view.style, { backgroundImage: address, backgroundPosition: `${-number * width}px 0`,
-        backgroundSize: `${picture.columns * width}px ${picture.height * scale}px` });
+        backgroundSize: `${picture.columns * width}px ${height}px` });
       column.append(view, element("small", "", clock(MINUTE * minute + number * picture.seconds)));
       column.onclick = event => {
         if (event.target.closest(".mark")) return;
@@ -239,7 +237,7 @@ function drawSummary() {
     table.append(row);
   }
   const done = planned().filter(item => state.checked.includes(item)).length;
-  get("summary").replaceChildren(element("p", "", `${done} of ${planned().length} minutes checked`), table);
+  get("summary").replaceChildren(element("p", "", `${done} of ${counted(planned().length, "minute")} checked`), table);
 }
 
 /** Show the estimate of the true count by the checked minutes of the sample. */
@@ -251,7 +249,7 @@ function drawEstimate() {
   const rows = estimateCounts({ counted: data.counted, strata: data.strata, errors, checked: indices(state.checked),
     drawn: indices(state.sample?.minutes ?? []) });
   const text = row => `${row.group ?? "all"}: ${row.counted} counted, ${Math.round(row.true)} true ` +
-    `(${Math.round(row.low)} to ${Math.round(row.high)})` + (row.more ? `; ${row.more} more minutes for ± 2 %` : "");
+    `(${Math.round(row.low)} to ${Math.round(row.high)})` + (row.more ? `; ${counted(row.more, "more minute")} for ± 2 %` : "");
   const words = state.sample ? "The estimate needs three checked minutes of the sample." : "Draw a sample for an estimate of the true count.";
   get("estimate").replaceChildren(...(rows.length ? rows.map(row => element("p", "", text(row))) : [element("p", "", words)]));
 }
@@ -268,7 +266,7 @@ function refresh(isNew = false) {
   drawSummary();
   drawEstimate();
   try {
-    localStorage.setItem(key, JSON.stringify({ state, minute }));
+    localStorage.setItem(data.key, JSON.stringify({ state, minute }));
   } catch {
     get("hint").textContent = "This browser keeps nothing; save before you close the page.";
   }
@@ -296,7 +294,8 @@ function spans() {
 }
 
 function eventLine(mark, error, correct) {
-  const parts = [`line: ${quoted(mark.line)}`, `time: ${mark.time}`, `direction: ${quoted(mark.direction)}`, `class: ${quoted(mark.class)}`];
+  const time = Math.round(1000 * (mark.seconds + data.start)) / 1000;
+  const parts = [`line: ${quoted(mark.line)}`, `time: ${time}`, `direction: ${quoted(mark.direction)}`, `class: ${quoted(mark.class)}`];
   if (mark.id !== undefined) parts.push(`id: ${mark.id}`);
   if (error) parts.push(`error: ${quoted(error)}`);
   if (correct) parts.push(`correct: ${quoted(correct)}`);
@@ -324,7 +323,7 @@ function corrections() {
   const complete = spans().concat(state.missed.map(mark => [mark.seconds, mark.seconds]));
   const isListed = mark => Object.keys(mark.fixes).length ||
     complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
-  const events = allMarks().filter(isListed).sort((a, b) => a.time - b.time).flatMap(eventLines);
+  const events = allMarks().filter(isListed).sort((a, b) => a.seconds - b.seconds).flatMap(eventLines);
   const sample = state.sample ? `{seed: ${state.sample.seed}, minutes: [${state.sample.minutes.join(", ")}]}` : "null";
   return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, ...list("lines", lines), ...list("zones", zones),
     `reviewer: ${state.reviewer ? quoted(state.reviewer) : "null"}`, `saved: ${now()}`, `sample: ${sample}`,
@@ -370,7 +369,7 @@ get("size").oninput = () => refresh(true);
 get("reviewer").onchange = event => change(() => { state.reviewer = event.target.value.trim(); });
 
 try {
-  const stored = JSON.parse(localStorage.getItem(key));
+  const stored = JSON.parse(localStorage.getItem(data.key));
   if (stored) ({ state, minute } = stored);
 } catch {
   get("hint").textContent = "This browser keeps nothing; save before you close the page.";
