@@ -181,4 +181,7 @@ def test_a_click_on_a_trace_adds_a_missed_vehicle(tmp_path: Path, run: Invoke) -
         ) == [0, 7]
         [added] = window.run("return state.missed")
     assert (added["line"], added["direction"]) == ("gate", "away")
-    assert (added["seconds"], added["position"]) == (pytest.approx(trace["time"]), trace["position"])
+    assert (added["seconds"], added["position"]) == (
+        pytest.approx(trace["time"]),
+        trace["position"],
+    )

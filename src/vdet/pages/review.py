@@ -15,12 +15,13 @@ from vdet.config.shapes import TrafficSettings
 from vdet.media import VideoInfo
 from vdet.pages.render import TEMPLATES, render
 from vdet.traffic.counts import Event, class_of
-from vdet.traffic.estimate import draw_minutes, strata_of
+from vdet.traffic.sample import draw_minutes, strata_of
 from vdet.traffic.strips import Band
 from vdet.traffic.traces import Trace
 
 PAGE_NAME = "review.html"
 _PICTURES = "<!-- pictures -->"
+_SCRIPTS = "estimate.js", "review.js"
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,9 +155,8 @@ class Review:
 
 def write_review(file: TextIO, review: Review, folder: Path) -> None:
     """Write the page. `folder` has its pictures, WebP files; a vehicle may have none."""
-    names = "review.js", "estimate.js"
-    script = Markup("".join((TEMPLATES / name).read_text("utf-8") for name in names))
-    page = render("review.html", data=review.data(), script=script, name=review.video.path.name)
+    scripts = [Markup((TEMPLATES / name).read_text("utf-8")) for name in _SCRIPTS]
+    page = render("review.html", data=review.data(), scripts=scripts, name=review.video.path.name)
     before, _, after = page.partition(_PICTURES)
     file.write(before)
     crops = {crop_name(mark.event.id) for mark in review.marks}

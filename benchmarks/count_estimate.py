@@ -1,18 +1,6 @@
-"""How right a count is: which minutes to check, and what they say about the others.
+"""The estimate of `estimate.js` in Python, for simulations; see there for the method.
 
-Some minutes of a video are drawn and checked by a person. Minutes are grouped into strata of
-similar traffic, and drawn at random without replacement in each. The true count is what was
-counted, plus the vehicles missed, minus those counted wrongly: known in checked minutes, estimated
-in the others. Both kinds of errors are estimated by the combined ratio estimator of stratified
-sampling (Cochran, Sampling Techniques, 3rd ed., 1977, chapters 5 and 6), in proportion to the
-vehicles counted in a minute.
-
-Each kind has two intervals of 95 %, and the wider limits hold: one for errors that come
-independently, also where none was seen (Garwood 1936, for weighted sums as in Fay and Feuer,
-Statistics in Medicine 16, 1997), and one from the scatter between minutes (Student's t), for errors
-that come together. The interval of the difference follows from those of both kinds (Zou and Donner,
-Statistics in Medicine 27, 2008). Quantiles are approximated as in `estimate.js`, so that a page and
-a table show the same numbers: chi-square by Wilson and Hilferty, t by Cornish and Fisher.
+`tests/traffic/test_estimate.py` compares their numbers.
 """
 
 from bisect import bisect_left
@@ -23,8 +11,8 @@ from math import hypot, inf, sqrt
 import numpy as np
 
 from vdet.boxes import Int64Array
+from vdet.traffic.sample import STRATA, strata_of
 
-STRATA = 4
 MIN_CHECKED = 3
 """Minimum number of drawn minutes that an interval needs."""
 PRECISION = 0.02
@@ -80,42 +68,6 @@ class Estimate:
     low: float
     high: float
     more: int
-
-
-def strata_of(traffic: Sequence[int] | Int64Array) -> Int64Array:
-    """Return the stratum of each minute, from 0 with the least traffic: (minutes,) int64.
-
-    Strata have about equal sums of the square root of the traffic, as the errors scatter (Cochran,
-    5A.7); equal numbers share one. `traffic` is the number of vehicles counted in each minute.
-    """
-    weights = np.sqrt(np.asarray(traffic, np.float64) + 1)
-    order = np.argsort(traffic, kind="stable")
-    middle = np.cumsum(weights[order]) - weights[order] / 2
-    first = np.searchsorted(np.asarray(traffic)[order], traffic)  # of equal numbers
-    strata: Int64Array = (STRATA * middle / weights.sum()).astype(np.int64)[first]
-    return strata
-
-
-def draw_minutes(traffic: Sequence[int], seed: int) -> list[int]:
-    """Return all minutes in the order in which to check them.
-
-    The first n are a random sample of n minutes, stratified by traffic, so a longer sample includes
-    a shorter one. Each stratum has a part of them by the sum of the square root of its traffic.
-
-    Parameters
-    ----------
-    traffic
-        Number of vehicles counted in each minute.
-    seed
-        Number that selects one of the possible samples, 0 or more.
-    """
-    strata, turns = strata_of(traffic), np.empty(len(traffic))
-    weights, random = np.sqrt(np.asarray(traffic) + 1.0), np.random.Generator(np.random.PCG64(seed))
-    for stratum in np.unique(strata):
-        members = strata == stratum
-        ranks = random.permutation(np.count_nonzero(members)) + 0.5
-        turns[members] = ranks / weights[members].sum()
-    return [int(minute) for minute in np.argsort(turns, kind="stable")]
 
 
 def estimate(
