@@ -285,7 +285,7 @@ def write_page(road: Hour, folder: Path) -> Survey:
     counts, true_counts = traffic.counts(), true.counts()
     assert counts
     assert true_counts
-    return Survey(counts, true_counts, passages.found[0])
+    return Survey(counts, true_counts, passages.by_band[0])
 
 
 def by_class(counts: Counts) -> Counter[tuple[str, str | None]]:

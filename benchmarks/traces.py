@@ -70,7 +70,7 @@ def lines_of(scene: PoleScene, truth: Sequence[FrameTracks]) -> list[Line]:
     passages = Passages(bands)
     for frame in truth:
         passages.add(frame)
-    pairs = list(zip(bands, passages.found, strict=True))
+    pairs = list(zip(bands, passages.by_band, strict=True))
     samplings = [sampling_of(band, found) for band, found in pairs]
     strips: list[list[Image]] = [[] for _ in bands]
     for drawn in frames(scene.scene):

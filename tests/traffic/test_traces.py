@@ -76,7 +76,7 @@ def traces_of(strips: Sequence[Image], *, minute: float = 60) -> list[Trace]:
     for first in range(0, len(strips), step):
         part = slice(first, first + step)
         is_end = first + step >= len(strips)
-        traces += search.search(frames[part], strips[part], passages.found[0], is_end=is_end)
+        traces += search.search(frames[part], strips[part], passages.by_band[0], is_end=is_end)
     return traces
 
 

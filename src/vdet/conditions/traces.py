@@ -13,7 +13,7 @@ _INTERVAL = 300
 
 
 def trace_findings(counts: Counts) -> tuple[Finding, ...]:
-    """Return a finding for each line or zone with traces; a single one is no warning."""
+    """Return a finding for each line or zone with traces; a single trace is a note."""
     vehicles = Counter(event.name for event in counts.events)
     findings = []
     for name, number in Counter(trace.name for trace in counts.traces).items():

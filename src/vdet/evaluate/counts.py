@@ -20,7 +20,7 @@ ALL = "all"
 
 @dataclass(slots=True)
 class CountScore:
-    """How right the counts in a direction are for one class of true vehicles, or for all.
+    """How right the counts in a direction are for a class, or for all.
 
     Attributes
     ----------

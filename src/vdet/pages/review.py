@@ -1,6 +1,7 @@
 """The page on which counts are checked: strips with marks, all in one file."""
 
 from base64 import b64encode
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -60,7 +61,7 @@ def crop_name(track: int) -> str:
 class Mark:
     """A counted event: number of the band, seconds from the first frame, position from 0 to 1.
 
-    A vehicle that appears or vanishes inside a zone is in no band.
+    What appears or vanishes inside a zone is in no band.
     """
 
     band: int | None
@@ -136,19 +137,18 @@ class Review:
         minutes = sorted(
             {picture.minute for picture in self.pictures} | {mark.minute for mark in self.marks}
         )
-        counted = {class_of(mark.event): [0] * len(minutes) for mark in self.marks}
-        for mark in self.marks:
-            counted[class_of(mark.event)][minutes.index(mark.minute)] += 1
-        traffic = [sum(numbers) for numbers in zip(*counted.values(), strict=True)]
-        traffic = traffic or [0] * len(minutes)
+        marks = Counter((class_of(mark.event), mark.minute) for mark in self.marks)
+        traffic = Counter(mark.minute for mark in self.marks)
+        numbers = [traffic[minute] for minute in minutes]
         seed = crc32(self.video.path.name.encode("utf-8", "surrogateescape"))
-        order = [minutes[index] for index in draw_minutes(traffic, seed)] if minutes else []
-        strata = strata_of(traffic).tolist() if minutes else []
         return {
             "minutes": minutes,
-            "counted": counted,
-            "strata": strata,
-            "order": order,
+            "counted": {
+                name: [marks[name, minute] for minute in minutes]
+                for name in dict.fromkeys(name for name, _ in marks)
+            },
+            "strata": strata_of(numbers).tolist(),
+            "order": [minutes[index] for index in draw_minutes(numbers, seed)],
             "seed": seed,
         }
 

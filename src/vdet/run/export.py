@@ -26,9 +26,8 @@ LABELS_NAME = "labels.coco.json"
 def export_checked(run: Run, tracks: Path, folder: Path, steps: Steps) -> None:
     """Write the frames in which checked vehicles cross lines.
 
-    The run has corrections. A vehicle is labelled, with its corrected class, in the frame of an
-    event that was counted rightly in a checked minute. Everything else in the frame is an ignore
-    region.
+    The run has corrections. A vehicle is labelled, with its corrected class, in the frame in which
+    it crosses a line in a checked minute. Everything else in the frame is an ignore region.
 
     Raises `VdetError` if an input cannot be used, no vehicle was checked, or an output cannot be
     written.
@@ -76,9 +75,9 @@ def _labelled(
     """
     vehicles, ignored, around = [], [], [Box(0, 0, *size)]
     for track in frame.tracks:
-        kind = checked.get((frame.index, track.id))
-        if kind and track.state != "predicted":
-            vehicles.append(replace(track, class_name=kind))
+        class_name = checked.get((frame.index, track.id))
+        if class_name and track.state != "predicted":
+            vehicles.append(replace(track, class_name=class_name))
             around = [part for region in around for part in _without(region, track.box)]
         else:
             ignored.append(track.box)

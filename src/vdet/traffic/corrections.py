@@ -24,7 +24,7 @@ from vdet.traffic.counts import Corrected, Counts, Event
 MAX_BYTES = 5_000_000
 """Size of a file of some 50,000 events."""
 TOLERANCE = 0.5
-"""Maximum seconds between two events that are the same one."""
+"""Maximum seconds between two records of an event."""
 _DIFFERENCE = 0.01
 """Seconds that an event of another id or class counts as farther away."""
 _LAST = 1.0
@@ -220,7 +220,7 @@ class Corrections(Section):
         ------
         ConfigError
             They are for different lines, or contradict each other: they correct an event in
-            different ways, or only one of them corrects it and the other has checked it too.
+            different ways, or only one corrects it, and both have checked it.
         """
         review.check(self.traffic)
         pairs = paired(self.events, review.events)
@@ -259,7 +259,7 @@ class Corrections(Section):
     def paired_with(
         self, events: Sequence[Event]
     ) -> list[tuple[ReviewedEvent | None, Event | None]]:
-        """Return its events with the counted ones that they are about.
+        """Return its events, each with the counted event that it is about.
 
         A missed vehicle may have been counted by another run: as an event that the reviewer says
         nothing of. That is known if the file has what was counted rightly.
@@ -287,7 +287,7 @@ class Corrections(Section):
 
 
 def read_corrections(paths: Iterable[Path]) -> list[Corrections]:
-    """Read files, and merge those of one video. Errors as `Corrections` has them."""
+    """Read files, and merge those of each video. Errors as in `Corrections`."""
     reviews: dict[str, Corrections] = {}
     for review in map(Corrections.read, paths):
         before = reviews.get(review.video)

@@ -2,7 +2,7 @@
 
 For each frame a band across the line is cut out along the way of the traffic, as wide as a vehicle
 moves in a frame, and the bands are joined in the order of time. So each vehicle leaves its picture,
-whether it was found or not (slit-scan photography, as in finish cameras).
+whether it was counted or not (slit-scan photography, as in finish cameras).
 """
 
 from collections import deque
@@ -36,7 +36,7 @@ _SLOW = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A line, or a side of a zone, whose strip is made.
+    """A line, or a side of a zone, of which there is a strip.
 
     Attributes
     ----------
@@ -96,18 +96,18 @@ class Passage:
 
 
 class Passages:
-    """Finds where the feet of tracks pass bands, frame by frame.
+    """Records where the feet of tracks pass bands, frame by frame.
 
     Attributes
     ----------
-    found
+    by_band
         The passages of each band, in order.
     """
 
     def __init__(self, bands: Sequence[Band]) -> None:
         self._bands = bands
         self._feet: dict[int, deque[tuple[int, float, Point]]] = {}
-        self.found: list[list[Passage]] = [[] for _ in bands]
+        self.by_band: list[list[Passage]] = [[] for _ in bands]
 
     def add(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
@@ -123,13 +123,13 @@ class Passages:
 
     def _pass(self, track: Track, time: float, feet: Sequence[tuple[int, float, Point]]) -> None:
         (first, _, oldest), (_, before, a), (last, _, b) = feet[0], feet[-2], feet[-1]
-        for band, found in zip(self._bands, self.found, strict=True):
+        for band, passages in zip(self._bands, self.by_band, strict=True):
             way = meeting((a, b), (band.start, band.end))
             if way is not None:
                 position = meeting((band.start, band.end), (a, b)) or 0.0
                 x, y = ((new - old) / (last - first) for new, old in zip(b, oldest, strict=True))
                 moment = before + way * (time - before)
-                found.append(Passage(track.id, moment, position, (x, y), track.box.width))
+                passages.append(Passage(track.id, moment, position, (x, y), track.box.width))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,13 +225,13 @@ def _velocities(
     normal = np.array([along[1], -along[0]]) / np.hypot(*along)
     if not passages:
         return np.tile(2 * _SLOW * normal, (len(positions), 1))
-    own = np.array([passage.velocity for passage in passages])
+    measured = np.array([passage.velocity for passage in passages])
     away = (positions[:, np.newaxis] - [passage.position for passage in passages]) / _NEAR
     weights = 1 / (1 + away**4)
-    sides = np.sign(own @ normal)
+    sides = np.sign(measured @ normal)
     most = np.where(weights @ sides >= 0, 1, -1)[:, np.newaxis]
     weights *= sides == most
-    means = weights @ own / np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
+    means = weights @ measured / np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
     speeds = np.hypot(*means.T)[:, np.newaxis]
     return np.asarray(np.where(speeds < _SLOW, most * _SLOW * normal, means))
 

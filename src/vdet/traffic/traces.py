@@ -73,7 +73,7 @@ class _Crossing:
 
 
 class TraceSearch:
-    """Looks for the traces at one band, minute by minute; `number` is that of the band."""
+    """Looks for the traces at a band, minute by minute; `number` is that of the band."""
 
     def __init__(self, number: int, band: Band) -> None:
         self._number = number
@@ -190,11 +190,11 @@ def _differences(rows: Sequence[Image], is_free: BoolArray) -> Float32Array:
     strip -= np.clip(light, -_MAX_LIGHT, _MAX_LIGHT)
     padded = np.pad(background, ((0, 0), (0, 0), (_PLAY, _PLAY)), mode="edge")
     moved = (padded[..., first : first + strip.shape[-1]] for first in range(2 * _PLAY + 1))
-    return reduce(np.minimum, (np.abs(strip - other).max(axis=0) for other in moved))
+    return reduce(np.minimum, (np.abs(strip - position).max(axis=0) for position in moved))
 
 
-def _median(values: Float32Array, is_known: BoolArray, axis: int) -> Float32Array:
-    """Return the median of the known values along an axis, which stays; 0 where there is none."""
-    masked = np.ma.array(values, mask=np.broadcast_to(~is_known, values.shape))
+def _median(values: Float32Array, is_valid: BoolArray, axis: int) -> Float32Array:
+    """Return the median of the valid values along an axis, which stays; 0 where there is none."""
+    masked = np.ma.array(values, mask=np.broadcast_to(~is_valid, values.shape))
     median = np.ma.median(masked, axis=axis, keepdims=True)  # type: ignore[no-untyped-call]
     return np.asarray(median.filled(0), np.float32)

@@ -1,8 +1,7 @@
 "use strict";
-// The page of `vdet review`. A mark is a counted crossing, or a vehicle that was missed. Its fixes say what is wrong with it:
+// The page of `vdet review`. A mark is a counted crossing, or a vehicle that was missed. Its fixes say what is wrong:
 // false or missed (with null), class or direction (with what is correct). What a person changes is the state: the fixes of
-// counted marks by their key, missed vehicles, and the checked minutes. Seconds count from the first frame of
-// the video, times as in its tables.
+// counted marks by their key, missed vehicles, and the checked minutes. Seconds count from the first frame of the video.
 const MINUTE = 60;
 const data = JSON.parse(document.getElementById("data").textContent);
 const get = id => document.getElementById(id);
@@ -302,7 +301,7 @@ function eventLine(mark, error, correct) {
   return `  - {${parts.join(", ")}}`;
 }
 
-/** Return the lines of the file for a mark. One that is wrong in two ways is false, and another one was missed. */
+/** Return the lines of the file for a mark. If class and direction are wrong, it is false, and a vehicle was missed. */
 function eventLines(mark) {
   const { class: name, direction } = mark.fixes;
   if (name && direction) return [eventLine(mark, "false"), eventLine({ ...mark, id: undefined, class: name, direction }, "missed")];

@@ -45,12 +45,12 @@ _CROP_SIDE = 120
 """Maximum side of the picture of a vehicle, pixels."""
 _QUALITY = 60
 _SAME = 1.0
-"""Maximum seconds between a counted crossing and the passage that gives its place."""
+"""Maximum seconds between a counted crossing and the passage that gives its position."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Spot:
-    """A place for the mark of an event: `seconds` between them, band, position from 0 to 1."""
+    """Where the mark of an event may be, and how many `seconds` from it a track passes there."""
 
     seconds: float
     band: int | None
@@ -59,7 +59,7 @@ class _Spot:
 
 @dataclass(slots=True)
 class _Strip:
-    """The strip of a band in the current minute; frames wait until its sampling is known.
+    """The strip of a band in the current minute; frames wait until its sampling is chosen.
 
     Frames have their seconds in the minute.
     """
@@ -126,17 +126,18 @@ class ReviewSink(BaseSink):
         if (minute := int(seconds // _MINUTE)) != self._minute:
             self._end_minute(is_end=False)
             self._minute = minute
-        self._coding = picture.planes.coding if (picture := result.frame.picture).planes else None
-        every = (*result.tracks, *result.unselected)
-        self._tracks.append(FrameTracks(result.frame.index, float(result.frame.time), every))
+        picture = result.frame.picture
+        self._coding = picture.planes.coding if picture.planes else None
+        tracks = (*result.tracks, *result.unselected)
+        self._tracks.append(FrameTracks(result.frame.index, float(result.frame.time), tracks))
         self._passages.add(self._tracks[-1])
-        for strip, passages in zip(self._strips, self._passages.found, strict=True):
+        for strip, passages in zip(self._strips, self._passages.by_band, strict=True):
             strip.add(seconds - _MINUTE * minute, picture, passages)
         self._write_crops(self._crops.add(result.frame_tracks, picture))
 
     def _end_minute(self, *, is_end: bool) -> None:
         for number, (strip, passages) in enumerate(
-            zip(self._strips, self._passages.found, strict=True)
+            zip(self._strips, self._passages.by_band, strict=True)
         ):
             if strip.waiting:
                 strip.decide(passages)
@@ -171,7 +172,7 @@ class ReviewSink(BaseSink):
         """Return the picture of a strip in the detail that `output.coarse` allows."""
         if not self.context.settings.output.coarse:
             return strip
-        band, passages = self._strips[number].band, self._passages.found[number]
+        band, passages = self._strips[number].band, self._passages.by_band[number]
         widest = max((passage.width for passage in passages), default=0.0)
         scale = coarse_scale(widest / band.length * band.samples, band.samples)
         return shrunk(strip, round(scale * band.samples) / band.samples)  # whole pixels a column
@@ -220,7 +221,7 @@ class ReviewSink(BaseSink):
     def _marks(self, events: Sequence[Event]) -> list[Mark]:
         """Return where the counted events are."""
         by_band_and_id: dict[tuple[int, int], list[Passage]] = defaultdict(list)
-        for number, passages in enumerate(self._passages.found):
+        for number, passages in enumerate(self._passages.by_band):
             for passage in passages:
                 by_band_and_id[number, passage.id].append(passage)
         marks = []
