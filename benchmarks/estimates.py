@@ -60,16 +60,16 @@ SITUATIONS = {
 class Result:
     """What one sample says of a group, beside the truth."""
 
-    made: Estimate
+    estimate: Estimate
     true: int
 
     @property
     def holds(self) -> bool:
-        return self.made.low <= self.true <= self.made.high
+        return self.estimate.low <= self.true <= self.estimate.high
 
     @property
     def half(self) -> float:
-        return (self.made.high - self.made.low) / 2
+        return (self.estimate.high - self.estimate.low) / 2
 
 
 def simulate(situation: Situation, seed: int) -> dict[str, Result]:
@@ -103,17 +103,17 @@ def simulate(situation: Situation, seed: int) -> dict[str, Result]:
     order = draw_minutes([int(number) for number in counted.sum(axis=0)], seed)
     checked = set(order[: situation.checked])
     table = {name: [int(n) for n in row] for name, row in zip(names, counted, strict=True)}
-    found = [error for error in errors if error.minute in checked]
-    made = estimate(table, found, checked, order)
+    seen = [error for error in errors if error.minute in checked]
+    estimates = estimate(table, seen, checked, order)
     totals = {None: true.sum()} | dict(zip(names, true.sum(axis=1), strict=True))
-    return {item.group or "all": Result(item, int(totals[item.group])) for item in made}
+    return {item.group or "all": Result(item, int(totals[item.group])) for item in estimates}
 
 
 def measure(situation: Situation, samples: int) -> dict[str, list[Result]]:
     """Return the results of many samples, by group."""
-    made = [simulate(situation, seed) for seed in range(samples)]
-    groups = made[0] if situation.renamed else ["all"]
-    return {group: [results[group] for results in made] for group in groups}
+    by_sample = [simulate(situation, seed) for seed in range(samples)]
+    groups = by_sample[0] if situation.renamed else ["all"]
+    return {group: [results[group] for results in by_sample] for group in groups}
 
 
 def main() -> None:
@@ -126,8 +126,8 @@ def main() -> None:
         for group, results in measure(situation, arguments.samples).items():
             true = np.mean([result.true for result in results])
             half = np.mean([result.half for result in results]) / true
-            error = np.mean([abs(result.made.true - result.true) for result in results]) / true
-            more = np.mean([result.made.more for result in results])
+            error = np.mean([abs(result.estimate.true - result.true) for result in results]) / true
+            more = np.mean([result.estimate.more for result in results])
             held = np.mean([result.holds for result in results])
             print(
                 f"| {name}: {group} | {situation.checked} of {situation.minutes} | {true:.0f} | "

@@ -67,11 +67,11 @@ def lines_of(scene: PoleScene, truth: Sequence[FrameTracks]) -> list[Line]:
     """Return the lines of a scene with their strips."""
     assert scene.settings.traffic
     bands = bands_of(lines_and_zones(scene.settings.traffic, WIDTH, HEIGHT)[0])
-    passages = Passages(bands)
+    passing = Passages(bands)
     for frame in truth:
-        passages.add(frame)
-    pairs = list(zip(bands, passages.by_band, strict=True))
-    samplings = [sampling_of(band, found) for band, found in pairs]
+        passing.add(frame)
+    pairs = list(zip(bands, passing.by_band, strict=True))
+    samplings = [sampling_of(band, passages) for band, passages in pairs]
     strips: list[list[Image]] = [[] for _ in bands]
     for drawn in frames(scene.scene):
         layers = layers_of(as_planes(drawn).picture)

@@ -42,7 +42,7 @@ class Car:
 
 @dataclass(frozen=True, slots=True)
 class Road:
-    """A video of cars, and the tracks of those that were found."""
+    """A video of cars, and the tracks of those that were counted."""
 
     video: Path
     tracks: Path
@@ -99,29 +99,29 @@ class Page:
     crops: dict[int, NDArray[np.uint8]]
 
     def streaks(self, minute: int) -> list[tuple[float, float]]:
-        """Return seconds and place of the middle of each red streak, in order of time."""
-        [place] = [item for item in self.data["pictures"] if item["minute"] == minute]
+        """Return seconds and position of the middle of each red streak, in order of time."""
+        [layout] = [item for item in self.data["pictures"] if item["minute"] == minute]
         picture = self.pictures[minute]
-        columns = np.split(picture, place["columns"], axis=1)
+        columns = np.split(picture, layout["columns"], axis=1)
         strip = np.concatenate(columns).astype(int)  # time runs down
         red = (strip[..., 2] - strip[..., 1] > 80).astype(np.uint8)
         _, _, stats, middles = cv2.connectedComponentsWithStats(red)
-        rows_a_second, width = place["height"] / place["seconds"], picture.shape[1] / len(columns)
-        found = zip(stats.tolist()[1:], middles.tolist()[1:], strict=True)
+        rows_a_second, width = layout["height"] / layout["seconds"], picture.shape[1] / len(columns)
+        areas = zip(stats.tolist()[1:], middles.tolist()[1:], strict=True)
         return sorted(
-            (60 * minute + y / rows_a_second, x / width) for (*_, area), (x, y) in found if area > 9
+            (60 * minute + y / rows_a_second, x / width) for (*_, area), (x, y) in areas if area > 9
         )
 
 
 def read_page(path: Path) -> Page:
     text = path.read_text("utf-8")
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
-    assert found
+    match = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    assert match
     pictures, crops = (
         {int(number): _picture(data) for number, data in re.findall(f'id="{name}">([^<]*)<', text)}
         for name in (r"strip-0-(\d+)", r"crop-(\d+)")
     )
-    return Page(json.loads(found[1]), pictures, crops)
+    return Page(json.loads(match[1]), pictures, crops)
 
 
 def _picture(data: str) -> NDArray[np.uint8]:

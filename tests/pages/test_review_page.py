@@ -26,18 +26,19 @@ def window(tmp_path: Path, run: Run) -> Iterator[Browser]:
         yield opened
 
 
-def click_at(window: Browser, seconds: float, place: float) -> None:
+def click_at(window: Browser, seconds: float, position: float) -> None:
     """Click on the strip at a time of this minute."""
     window.run(
-        "const [seconds, place] = arguments, item = data.pictures.find(p => p.minute === minute);"
+        "const [seconds, position] = arguments;"
+        "const item = data.pictures.find(p => p.minute === minute);"
         "const number = Math.floor((seconds % 60) / item.seconds);"
         "const column = document.querySelectorAll('.column')[number];"
         "const box = column.getBoundingClientRect();"
         "let y = (seconds % 60) / item.seconds - number; if (item.is_upward) y = 1 - y;"
         "column.dispatchEvent(new MouseEvent('click', { bubbles: true,"
-        " clientX: box.left + place * box.width, clientY: box.top + y * box.height }));",
+        " clientX: box.left + position * box.width, clientY: box.top + y * box.height }));",
         seconds,
-        place,
+        position,
     )
 
 

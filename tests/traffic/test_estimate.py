@@ -40,10 +40,10 @@ def test_a_sample_has_minutes_of_little_and_of_much_traffic() -> None:
         assert set(drawn) == set(strata)
 
 
-def test_what_was_found_is_added_and_removed_where_all_minutes_are_checked() -> None:
+def test_errors_are_added_and_removed_where_all_minutes_are_checked() -> None:
     errors = [MISSED, MISSED, FALSE, CountError(minute=3, counted="car", true="bus")]
-    made = estimate(CARS, errors, checked=range(60), drawn=[])
-    assert made == [
+    estimates = estimate(CARS, errors, checked=range(60), drawn=[])
+    assert estimates == [
         Estimate(group=None, counted=600, true=601, low=601, high=601, more=0),
         Estimate(group="bus", counted=0, true=1, low=1, high=1, more=0),
         Estimate(group="car", counted=600, true=600, low=600, high=600, more=0),
@@ -128,12 +128,12 @@ def test_the_page_shows_the_same_numbers(tmp_path: Path) -> None:
     with browser(tmp_path) as window:
         window.open(page)
         shown = window.run(
-            "return JSON.stringify(arguments[0].map(({ order, ...made }) =>"
-            " estimateCounts({ ...made, checked: new Set(order), drawn: new Set(order) })))",
+            "return JSON.stringify(arguments[0].map(({ order, ...values }) =>"
+            " estimateCounts({ ...values, checked: new Set(order), drawn: new Set(order) })))",
             cases,
         )
-    for made, wanted in zip(json.loads(shown), expected, strict=True):
-        assert [item["group"] for item in made] == [item.group for item in wanted]
-        for item, own in zip(made, wanted, strict=True):
+    for of_page, in_python in zip(json.loads(shown), expected, strict=True):
+        assert [item["group"] for item in of_page] == [item.group for item in in_python]
+        for item, exact in zip(of_page, in_python, strict=True):
             for name in ("counted", "true", "low", "high", "more"):
-                assert isclose(item[name], getattr(own, name), rel_tol=1e-9), (item, own)
+                assert isclose(item[name], getattr(exact, name), rel_tol=1e-9), (item, exact)

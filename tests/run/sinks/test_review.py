@@ -1,4 +1,4 @@
-"""Strips: each vehicle leaves one streak, with its mark at the right time and place."""
+"""Strips: each vehicle leaves one streak, with its mark at the right time and position."""
 
 from pathlib import Path
 
@@ -18,11 +18,11 @@ def test_each_vehicle_leaves_one_streak_with_its_mark(tmp_path: Path, run: Run) 
     page = read_page(reviewed(run, tmp_path))
     streaks = [streak for minute in (0, 1) for streak in page.streaks(minute)]
     assert len(streaks) == len(CARS) == len(page.data["marks"])
-    for car, mark, (seconds, place) in zip(CARS, page.data["marks"], streaks, strict=True):
+    for car, mark, (seconds, position) in zip(CARS, page.data["marks"], streaks, strict=True):
         assert mark["direction"] == ("away" if car.goes_up else "here")
         assert mark["seconds"] == pytest.approx(car.time, abs=0.05)
         assert mark["position"] == pytest.approx((car.x - 20) / 280, abs=0.01)
-        assert place == pytest.approx(mark["position"], abs=0.02)
+        assert position == pytest.approx(mark["position"], abs=0.02)
         # The body passes before the foot of a car that goes away, and after that of one that comes.
         assert seconds == pytest.approx(car.time + (-0.15 if car.goes_up else 0.15), abs=0.1)
 
@@ -84,7 +84,7 @@ def test_a_review_needs_a_line(tmp_path: Path, run: Run) -> None:
 def test_the_live_review_equals_that_of_saved_tracks(tmp_path: Path, run: Run) -> None:
     road = draw_road(tmp_path, CARS[:2], seconds=9)
     shared = ["-c", road.settings]
-    tracks, live, later = (tmp_path / name for name in ("own.jsonl", "live", "later"))
+    tracks, live, later = (tmp_path / name for name in ("tracks.jsonl", "live", "later"))
     run(
         "detect-video",
         road.video,

@@ -98,12 +98,13 @@ function draw() {
 }
 
 function go(steps, isChecked) {
-  const next = planned()[planned().indexOf(minute) + steps];
-  if (isChecked && !state.checked.includes(minute)) change(() => state.checked.push(minute));
-  if (next === undefined) return refresh();
-  [minute, selected] = [next, null];
-  scrollTo(0, 0);
-  refresh();
+  const next = planned()[planned().indexOf(minute) + steps], checked = minute;
+  if (next !== undefined) {
+    [minute, selected] = [next, null];
+    scrollTo(0, 0);
+  }
+  if (isChecked && !state.checked.includes(checked)) change(() => state.checked.push(checked));
+  else refresh();
 }
 
 // ---------------------------------------------------------------- the view
