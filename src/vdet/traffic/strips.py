@@ -95,6 +95,15 @@ class Passage:
     width: float
 
 
+@dataclass(frozen=True, slots=True)
+class _Foot:
+    """The foot of a track in a frame: number of the frame, seconds, pixels."""
+
+    index: int
+    time: float
+    point: Point
+
+
 class Passages:
     """Records where the feet of tracks pass bands, frame by frame.
 
@@ -106,7 +115,7 @@ class Passages:
 
     def __init__(self, bands: Sequence[Band]) -> None:
         self._bands = bands
-        self._feet: dict[int, deque[tuple[int, float, Point]]] = {}
+        self._feet: dict[int, deque[_Foot]] = {}
         self.by_band: list[list[Passage]] = [[] for _ in bands]
 
     def add(self, frame: FrameTracks) -> None:
@@ -115,21 +124,22 @@ class Passages:
         self._feet = {key: feet for key, feet in self._feet.items() if key in shown}
         for track in frame.tracks:
             feet = self._feet.setdefault(track.id, deque())
-            feet.append((frame.index, frame.time, track.foot))
-            while frame.time - feet[0][1] > _HISTORY:
+            feet.append(_Foot(frame.index, frame.time, track.foot))
+            while frame.time - feet[0].time > _HISTORY:
                 feet.popleft()
             if len(feet) > 1:
-                self._pass(track, frame.time, feet)
+                self._pass(track, feet)
 
-    def _pass(self, track: Track, time: float, feet: Sequence[tuple[int, float, Point]]) -> None:
-        (first, _, oldest), (_, before, a), (last, _, b) = feet[0], feet[-2], feet[-1]
+    def _pass(self, track: Track, feet: Sequence[_Foot]) -> None:
+        before, now = feet[-2], feet[-1]
+        step, frames = (before.point, now.point), now.index - feet[0].index
         for band, passages in zip(self._bands, self.by_band, strict=True):
-            way = meeting((a, b), (band.start, band.end))
+            way = meeting(step, (band.start, band.end))
             if way is not None:
-                position = meeting((band.start, band.end), (a, b)) or 0.0
-                x, y = ((new - old) / (last - first) for new, old in zip(b, oldest, strict=True))
-                moment = before + way * (time - before)
-                passages.append(Passage(track.id, moment, position, (x, y), track.box.width))
+                position = meeting((band.start, band.end), step) or 0.0
+                x, y = (np.subtract(now.point, feet[0].point) / frames).tolist()
+                time = before.time + way * (now.time - before.time)
+                passages.append(Passage(track.id, time, position, (x, y), track.box.width))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
