@@ -70,6 +70,8 @@ def test_every_error_takes_two_actions(window: Browser) -> None:
     window.type("2")
     window.type(ENTER)
     window.type(TAB, "d")  # another direction
+    sentence = "Checked 1 of 2 minutes: 50.0 % counted, 1 false; bus: 0 of 1 named right."
+    assert window.text("#summary p") == sentence
     values = saved(window)
     assert values["video"] == "in.mp4"
     assert values["size"] == [320, 240]

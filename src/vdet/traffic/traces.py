@@ -139,7 +139,7 @@ class TraceSearch:
         shortest, longest = np.quantile(frames, _SHORT, method="lower"), frames.max()
         for label, (left, top, width, height, area) in enumerate(stats[1:].tolist(), start=1):
             near = np.argsort(np.abs(positions - left - width / 2))[:_NEAR]
-            usual = np.median(widths[near])
+            usual = np.quantile(widths[near], _SHORT, method="lower")
             is_large = width >= _WIDTH * usual and area >= _AREA * usual * shortest
             if is_large and _DURATION * shortest <= height <= _LONGEST * longest:
                 row = top + int(np.median(passed[near]) * (height - 1))

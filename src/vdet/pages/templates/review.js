@@ -236,8 +236,21 @@ function drawSummary() {
     for (const value of values) row.append(element("td", "", value));
     table.append(row);
   }
+  get("summary").replaceChildren(element("p", "", sentence()), table);
+}
+
+/** Return the sentence for a report: what was checked, and how right the counts are there. */
+function sentence() {
   const done = planned().filter(item => state.checked.includes(item)).length;
-  get("summary").replaceChildren(element("p", "", `${done} of ${counted(planned().length, "minute")} checked`), table);
+  const marks = allMarks().filter(mark => state.checked.includes(minuteOf(mark)));
+  const passed = marks.filter(mark => !("false" in mark.fixes)), seen = passed.filter(mark => !isMissed(mark));
+  const parts = [`Checked ${done} of ${counted(planned().length, "minute")}`];
+  if (passed.length) parts[0] += `: ${(100 * seen.length / passed.length).toFixed(1)} % counted, ${marks.length - passed.length} false`;
+  for (const name of new Set(seen.map(classOf))) {
+    const vehicles = seen.filter(mark => classOf(mark) === name), right = vehicles.filter(mark => !mark.fixes.class).length;
+    if (right < vehicles.length) parts.push(`${name}: ${right} of ${vehicles.length} named right`);
+  }
+  return `${parts.join("; ")}.`;
 }
 
 /** Show the estimate of the true count by the checked minutes of the sample. */
