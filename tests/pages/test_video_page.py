@@ -17,6 +17,7 @@ from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.conditions.finding import Finding
+from vdet.config.schema import Settings
 from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
@@ -24,6 +25,7 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
+from vdet.traffic.survey import Survey
 
 NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
@@ -60,6 +62,10 @@ def counted(*events: tuple[Any, ...]) -> Counts:
         for vehicle, speed in [(*more, *(number, None)[len(more) :])]
     ]
     return Counts(tuple(made), tuple(dict.fromkeys((e.name, e.direction) for e in made)), ())
+
+
+def survey(counts: Counts) -> Survey:
+    return Survey({"a.mp4": counts}, Settings())
 
 
 def player_of(name: str) -> Player:
@@ -111,17 +117,17 @@ class TestVideoPage:
 
     def test_counts_are_shown_by_interval_where_there_are_any(self) -> None:
         counts = counted(*(("north", "in", at) for at in (1, 2, 3)), (NASTY, "in", 1))
-        made = seen(replace(page(), counts=counts, interval=1))
+        made = seen(replace(page(), survey=survey(counts), interval=1))
         assert "At lines and zones" in made.text
         assert "north: in: 3" in made.text
         assert f"{NASTY}: in: 1" in made.text
-        assert "At lines and zones" not in seen(replace(page(), counts=counts)).text
+        assert "At lines and zones" not in seen(replace(page(), survey=survey(counts))).text
 
     def test_intervals_begin_at_round_times_of_the_clock_as_in_tables(self) -> None:
         counts = counted(*(("north", "in", at) for at in (60, 360, 840)))
         begin = datetime.fromisoformat("2026-05-01 07:10+02:00")
         clock = Clock(begin, "as given", begin.tzinfo)
-        made = seen(replace(page(end=900), counts=counts, interval=900, clock=clock))
+        made = seen(replace(page(end=900), survey=survey(counts), interval=900, clock=clock))
         tips = re.findall(r"07:..: . north: in", made.text)
         assert tips == ["07:00: 1 north: in", "07:15: 2 north: in"]
         rows = replace(counts, spans=((0, 899.96),), clock=clock).table(900)
@@ -138,22 +144,25 @@ class TestVideoPage:
         counts = counted(("north", "in", 1), ("north", "in", 2), ("north", "out", 3))
         car, truck, other = counts.events
         events = replace(car, class_name="car"), replace(truck, class_name="truck"), other
-        made = seen(replace(page(), counts=replace(counts, events=events)))
+        made = seen(replace(page(), survey=survey(replace(counts, events=events))))
         words = (
-            "line or zone direction car truck vehicle vehicles north in 1 1 0 2 north out 0 0 1 1"
+            "line or zone direction all vehicles car truck vehicle heavy, %"
+            " north in 2 1 1 0 50 north out 1 0 0 1 0"
         )
         assert re.search(words.replace(" ", r"\s*"), made.text)
 
     def test_flows_have_a_row_and_an_arrow_each(self) -> None:
         counts = counted(("north", "in", 1, 1), ("south", "out", 2, 1), ("north", "in", 1, 2))
-        made = seen(replace(page(), counts=counts))
-        assert re.search(r"from\s*to\s*vehicles\s*north\s*south\s*1\s*north\s*–\s*1", made.text)
+        made = seen(replace(page(), survey=survey(counts)))
+        assert re.search(
+            r"from\s*to\s*all vehicles\s*north\s*south\s*1\s*north\s*\(none\)\s*1", made.text
+        )
         assert any("an arrow for each flow" in (item["alt"] or "") for item in made.all("img"))
         assert "Flows" not in seen(page()).text
 
     def test_speeds_are_shown_where_they_are_known(self) -> None:
         counts = counted(("north", "in", 1, 1, 36.0), ("north", "in", 2, 2, 40.0))
-        made = seen(replace(page(), counts=counts))
+        made = seen(replace(page(), survey=survey(counts)))
         assert re.search(r"north\s*in\s*2\s*38\s*39", made.text)
 
     def test_a_vehicle_that_was_lost_has_a_gap_in_its_bar(self) -> None:
@@ -201,7 +210,7 @@ def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
     counts = counted(("north", "in", 1, 1), ("south", "in", 2, 1), *[("</script><b>", "in", 1)] * 8)
     clock = Clock(datetime(2026, 5, 1, 7, tzinfo=UTC), "as given", UTC)
     known = {1: "../a.crops/vehicle-0001.jpg"}
-    facts = replace(page(), counts=counts, clock=clock, pictures=known).facts
+    facts = replace(page(), survey=survey(counts), clock=clock, pictures=known).facts
     assert (facts.frames, facts.vehicles, facts.max_at_once) == (52, 2, 1)
     assert facts.counts == {"north: in": 1, "south: in": 1, "</script><b>: in": 8}
     assert facts.rows == (

@@ -178,18 +178,18 @@ def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) 
         {part}   box   exit  {NOTHING}""")
     assert sheets["Flows"] == table(f"""
         start end observed,_s part from to {numbers}
-        {first}  north east   1 2 0 1 0 100 2.5
         {first}  north south  1 2 1 0 0 0   1
-        {first}  east  (none) {NOTHING}
+        {first}  north east   1 2 0 1 0 100 2.5
         {first}  south north  {NOTHING}
-        {second} north east   {NOTHING}
+        {first}  east  (none) {NOTHING}
         {second} north south  {NOTHING}
-        {second} east  (none) {NOTHING}
+        {second} north east   {NOTHING}
         {second} south north  1 2 1 0 0 0   1
-        {part}   north east   {NOTHING}
+        {second} east  (none) {NOTHING}
         {part}   north south  {NOTHING}
-        {part}   east  (none) 1 6 0 0 1 0   1
-        {part}   south north  {NOTHING}""")
+        {part}   north east   {NOTHING}
+        {part}   south north  {NOTHING}
+        {part}   east  (none) 1 6 0 0 1 0   1""")
     assert sheets["Turning movements"] == table(
         f"""
         start end observed,_s part N_left N_through N_right N_U-turn N_all
@@ -204,25 +204,24 @@ def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) 
 def test_zones_vehicles_files_and_notes(book: Path) -> None:
     sheets = lines_of(book)
     assert sheets["Zones"] == table("""
-        start end observed,_s part zone entered left mean max mean_stay,_s max_stay,_s
+        start end observed,_s part zone entered left mean_inside max_inside mean_stay,_s
+            max_stay,_s
         07:00:00 07:30:00 1800 -    box 1 1 0.002 1 4 4
         07:30:00 08:00:00 1800 -    box 0 0 0 0 - -
         08:00:00 08:30:00 600  part box 0 0 0 0 - -""")
     assert sheets["Vehicles"] == table(
         """
         clock time_in_the_file file line_or_zone direction vehicle class score
-            seconds_in_the_zone km/h mean_km/h
-        07:01:00 0:01:00 07.jsonl north in    1 car     0.9 - 41.5 -
-        07:01:02 0:01:02 07.jsonl box   enter 1 car     0.9 - -    -
-        07:01:06 0:01:06 07.jsonl box   exit  1 car     0.9 4 -    -
-        07:01:10 0:01:10 07.jsonl south out   1 car     0.9 - -    -
-        07:16:40 0:16:40 07.jsonl north in    2 truck   0.9 - -    -
-        07:16:50 0:16:50 07.jsonl east  out   2 truck   0.9 - -    -
-        07:59:59 0:59:59 07.jsonl south in    3 car     0.9 - -    -
-        08:00:05 0:00:05 08.jsonl north out   3 car     0.9 - -    -
-        08:05:00 0:05:00 08.jsonl east  in    4 tractor 0.9 - -    -""".replace(
-            "\n            ", " "
-        )
+            seconds_in_the_zone km/h
+        07:01:00 0:01:00 07.jsonl north in    1 car     0.9 - 41.5
+        07:01:02 0:01:02 07.jsonl box   enter 1 car     0.9 - -
+        07:01:06 0:01:06 07.jsonl box   exit  1 car     0.9 4 -
+        07:01:10 0:01:10 07.jsonl south out   1 car     0.9 - -
+        07:16:40 0:16:40 07.jsonl north in    2 truck   0.9 - -
+        07:16:50 0:16:50 07.jsonl east  out   2 truck   0.9 - -
+        07:59:59 0:59:59 07.jsonl south in    3 car     0.9 - -
+        08:00:05 0:00:05 08.jsonl north out   3 car     0.9 - -
+        08:05:00 0:05:00 08.jsonl east  in    4 tractor 0.9 - -""".replace("\n            ", " ")
     )
     assert sheets["Files"] == table("""
         file first_frame last_frame observed,_s after_the_file_before clock events doubts
@@ -260,7 +259,11 @@ def test_without_clocks_and_classes_there_are_times_of_the_video(tmp_path: Path)
     assert sheets["Intervals"][:2] == table("""
         start end observed,_s part line_or_zone direction all_vehicles per_hour
         0:00:00 0:59:59.960000 3599.96 - north in 1 1""")
-    assert sheets["Vehicles"][1] == ("- 0:00:05.500000 a\\udcff north in 1 vehicle 0.9 - - -")
+    assert sheets["Vehicles"] == table("""
+        time_in_the_file file line_or_zone direction vehicle class score
+        0:00:05.500000 a\\udcff north in 1 vehicle 0.9""")
+    empty = written(tmp_path / "empty.xlsx", Survey({"a": replace(video, events=())}, plain))
+    assert [*lines_of(empty)] == ["Summary", "Intervals", "Zones", "Files", "Notes"]
 
 
 def test_turns_are_seen_from_the_arm_of_entry() -> None:

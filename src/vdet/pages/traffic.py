@@ -4,9 +4,9 @@ Their image consists of marks, which are drawn into a frame or written as SVG.
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
 
@@ -17,16 +17,14 @@ from vdet.config.schema import Settings
 from vdet.config.shapes import TrafficSettings
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
-from vdet.errors import ConfigError
+from vdet.errors import ConfigError, clock_text
 from vdet.media.images import read_image
 from vdet.pages.render import Table
 from vdet.polygons import Point
-from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
+from vdet.traffic.counts import Counts, Direction, trips_by_flow
 from vdet.traffic.crossings import Border, Line, lines_and_zones
 from vdet.traffic.records import VehicleRecord
-
-_NO_DESTINATION = "–"
-"""Destination of a flow with a single line or zone."""
+from vdet.traffic.workbook import Cell, SheetTable
 
 _WIDEST = 0.012
 """Width of the arrow of the largest flow, as a fraction of the frame's width."""
@@ -53,15 +51,6 @@ class Mark:
     is_arrow: bool = False
 
 
-def flows_of(counts: Counts) -> dict[tuple[str, str], list[tuple[Event, Event]]]:
-    """Return the first and last event of each vehicle by flow, the largest flow first."""
-    flows: dict[tuple[str, str], list[tuple[Event, Event]]] = {}
-    for _, first, last in vehicle_flows([counts]):
-        flow = first.name, last.name if last else _NO_DESTINATION
-        flows.setdefault(flow, []).append((first, last or first))
-    return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
-
-
 def traffic_marks(
     size: tuple[int, int],
     borders: Sequence[Border],
@@ -74,10 +63,11 @@ def traffic_marks(
     """
     totals = {(total.name, total.direction): total.count for total in counts.totals}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
-    flows = flows_of(counts)
-    maximum = max(map(len, flows.values()), default=1)
-    for number, trips in enumerate(flows.values()):
-        shown = sorted((paths[last.id] for _, last in trips if last.id in paths), key=len)
+    flows = trips_by_flow([counts]).values()
+    maximum = max(map(len, flows), default=1)
+    for number, trips in enumerate(flows):
+        last_events = [trip.last or trip.first for trip in trips]
+        shown = sorted((paths[event.id] for event in last_events if event.id in paths), key=len)
         typical = shown[len(shown) // 2] if shown else ()
         path = _inside(typical, size)
         if len(path) > 1:
@@ -193,39 +183,22 @@ def scene_picture(
     return with_marks(image, traffic_marks((width, height), (*lines, *zones), counts, paths))
 
 
-def direction_table(counts: Counts) -> Table:
-    """Return a row for each direction, with speeds if they are known."""
-    events = {
-        direction: [event for event in counts.events if (event.name, event.direction) == direction]
-        for direction in counts.directions
-    }
-    headings, rows = _by_class(("line or zone", "direction"), events)
-    if all(event.speed is None for event in counts.events):
-        return headings, rows
-    with_speeds = [
-        (*row, *_speeds(group)) for row, group in zip(rows, events.values(), strict=True)
-    ]
-    return (*headings, "median km/h", "85 % km/h"), with_speeds
+def page_table(table: SheetTable) -> Table:
+    """Return a table as text, without the classes that no vehicle has."""
+    rows = [list(map(_text, row)) for row in table.rows]
+    shown = [n for n, cells in enumerate(zip(*rows, strict=True)) if n < 3 or {*cells} - {"", "0"}]
+    headings = [table.headings[n] for n in shown] if table.headings else []
+    return headings, [[row[n] for n in shown] for row in rows]
 
 
-def flow_table(counts: Counts) -> Table:
-    """Return a row for each flow, the largest first."""
-    first_events = {flow: [first for first, _ in trips] for flow, trips in flows_of(counts).items()}
-    return _by_class(("from", "to"), first_events)
-
-
-def _by_class(headings: Sequence[str], groups: Mapping[tuple[str, str], Sequence[Event]]) -> Table:
-    """Return a row for each group of events: how many, by class if there are several classes."""
-    classes = sorted({class_of(event) for events in groups.values() for event in events})
-    columns = classes if len(classes) > 1 else []
-    rows = []
-    for names, events in groups.items():
-        numbers = Counter(map(class_of, events))
-        rows.append((*names, *(str(numbers[name]) for name in columns), str(len(events))))
-    return (*headings, *columns, "vehicles"), rows
-
-
-def _speeds(events: Sequence[Event]) -> Sequence[str]:
-    """Return the median and the 85 % quantile of speeds, as text."""
-    speeds = [event.speed for event in events if event.speed is not None]
-    return [f"{speed:.0f}" for speed in np.quantile(speeds, [0.5, 0.85])] if speeds else ("–", "–")
+def _text(cell: Cell) -> str:
+    match cell:
+        case None:
+            return ""
+        case datetime():
+            return f"{cell:%Y-%m-%d %H:%M:%S}"
+        case timedelta():
+            return clock_text(int(cell.total_seconds()), hours=True)
+        case float():
+            return f"{round(cell, 2):g}"
+    return str(cell)

@@ -15,18 +15,13 @@ from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
 from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
 from vdet.pages.render import jpeg_uri, render
-from vdet.pages.traffic import (
-    direction_table,
-    flow_table,
-    path_marks,
-    traffic_marks,
-    with_marks,
-)
+from vdet.pages.traffic import page_table, path_marks, traffic_marks, with_marks
 from vdet.traffic.clock import Clock, Intervals, Span
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
+from vdet.traffic.survey import Survey
 
 _MAX_VEHICLES = 300  # in the timeline, and with pictures
 _DOUBT = "#f3d9a4", "#333"  # colours of the row with doubtful times
@@ -75,8 +70,8 @@ class VideoPage:
         The frame with the most vehicles, BGR uint8; None without frames.
     settings
         The settings of the run as YAML.
-    counts
-        None if nothing is counted.
+    survey
+        The counts; None if nothing is counted.
     interval
         Interval of the counts over time, seconds.
     clock
@@ -101,7 +96,7 @@ class VideoPage:
     poster: Image | None
     player: Player | None
     settings: str
-    counts: Counts | None = None
+    survey: Survey | None = None
     interval: int = 60
     clock: Clock | None = None
     pictures: Mapping[int, str] = field(default_factory=dict)
@@ -109,6 +104,11 @@ class VideoPage:
     findings: Sequence[Finding] = ()
     clips: Mapping[int, str] = field(default_factory=dict)
     review: str = ""
+
+    @property
+    def counts(self) -> Counts | None:
+        """The counts of the survey."""
+        return self.survey.counts[0] if self.survey else None
 
     @property
     def facts(self) -> VideoFacts:
@@ -184,8 +184,8 @@ class VideoPage:
             time_axis=x,
             timeline=_timeline(shown, self.findings),
             interval_plots=self._interval_plots(x),
-            directions=self.counts and direction_table(self.counts),
-            flows=self.counts and flow_table(self.counts),
+            directions=self.survey and page_table(self.survey.volumes()),
+            flows=self.survey and page_table(self.survey.flows()),
             color_of=color_of,
             traffic=self._traffic(),
             paths=self._paths(),

@@ -74,6 +74,28 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class Trip:
+    """The first and the last event of a vehicle.
+
+    Attributes
+    ----------
+    video
+        Number of the video of the first event.
+    last
+        None if there is only one event.
+    """
+
+    video: int
+    first: Event
+    last: Event | None
+
+    @property
+    def flow(self) -> tuple[str, str | None]:
+        """The first line or zone, and the last one."""
+        return self.first.name, self.last.name if self.last else None
+
+
+@dataclass(frozen=True, slots=True)
 class DirectionTotal:
     """Number of vehicles counted in a direction, in total and by class."""
 
@@ -293,9 +315,9 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     """
     intervals = _intervals(videos, interval)
     counts: Counter[tuple[int, tuple[str, str | None], str]] = Counter()
-    for index, first, last in vehicle_flows(videos):
-        flow = first.name, last.name if last else None
-        counts[intervals.number(index, first.time), flow, class_of(first)] += 1
+    for trip in trips_of(videos):
+        number = intervals.number(trip.video, trip.first.time)
+        counts[number, trip.flow, class_of(trip.first)] += 1
     names: list[str | None] = [*flow_names(videos), None]
     flows = sorted({flow for _, flow, _ in counts}, key=lambda flow: list(map(names.index, flow)))
     return [FlowRow(*values) for values in _rows(intervals, counts, flows)]
@@ -321,14 +343,11 @@ def class_columns(videos: Sequence[Counts]) -> list[str]:
     if counted <= {None} and counted:
         return [UNKNOWN]
     listed = (name for video in videos for name in video.classes)
-    return list(dict.fromkeys((*listed, *sorted(filter(None, counted))))) or [UNKNOWN]
+    return list(dict.fromkeys((*listed, *sorted(name or UNKNOWN for name in counted)))) or [UNKNOWN]
 
 
-def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event | None]]:
-    """Yield the first and last event of each vehicle that crosses a line or enters a zone.
-
-    The number of the video of the first event precedes them; the last is None if there is only one.
-    """
+def trips_of(videos: Sequence[Counts]) -> Iterator[Trip]:
+    """Yield the trip of each vehicle that crosses a line or enters a zone."""
     trips: dict[int, list[tuple[int, Event]]] = {}
     for index, video in enumerate(videos):
         names = set(video.flow_names)
@@ -337,7 +356,15 @@ def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event 
             if is_visit and event.name in names:
                 trips.setdefault(event.vehicle, []).append((index, event))
     for (index, first), *later in trips.values():
-        yield index, first, later[-1][1] if later else None
+        yield Trip(index, first, later[-1][1] if later else None)
+
+
+def trips_by_flow(videos: Sequence[Counts]) -> dict[tuple[str, str | None], list[Trip]]:
+    """Return the trips of each flow, the largest flow first."""
+    flows: dict[tuple[str, str | None], list[Trip]] = {}
+    for trip in trips_of(videos):
+        flows.setdefault(trip.flow, []).append(trip)
+    return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
 
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:

@@ -121,12 +121,11 @@ def wide_table(
 
 def flow_matrix(videos: Sequence[Counts]) -> dict[str, dict[str, int]]:
     """Return the number of vehicles by origin and destination, which may be `NOWHERE`."""
-    flows = Counter(
-        (first.name, last.name if last else NOWHERE)
-        for _, first, last in tables.vehicle_flows(videos)
-    )
+    flows = Counter(trip.flow for trip in tables.trips_of(videos))
     names = tables.flow_names(videos)
-    return {origin: {end: flows[origin, end] for end in (*names, NOWHERE)} for origin in names}
+    return {
+        origin: {end or NOWHERE: flows[origin, end] for end in (*names, None)} for origin in names
+    }
 
 
 def _json(

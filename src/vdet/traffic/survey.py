@@ -1,10 +1,11 @@
-"""The tables of a survey, for its workbook and its page."""
+"""The tables of a survey, for its workbook and its pages."""
 
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from datetime import datetime, timedelta
-from itertools import groupby, product
+from itertools import chain, product
 
 import numpy as np
 
@@ -15,11 +16,15 @@ from vdet.errors import ConfigError, counted
 from vdet.traffic import counts as tables
 from vdet.traffic import measures
 from vdet.traffic.clock import ClockTime, Interval, Intervals
-from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow, class_of
+from vdet.traffic.counts import Counts, Event, ZoneRow, class_of
 from vdet.traffic.workbook import Cell, Sheet, SheetTable
 from vdet.version import __version__
 
 _TIMES = "start", "end", "observed, s", "part"
+_DIRECTION = "line or zone", "direction"
+_FLOW = "from", "to"
+_PEAK = "peak hour", "vehicles in it", "peak hour factor"
+_SPEEDS = "median km/h", "85 % km/h"
 _ALL = "all"
 _JOINED = 2.0
 """Maximum seconds from the last frame of a file to the first of the next one, without a gap."""
@@ -31,6 +36,18 @@ heavy: the share of trucks and buses. all flows: each vehicle once, at its first
 flow: from the first line or zone of a vehicle to the last, in the interval of the first. \
 {NOWHERE}: it was counted at one only; turning movements leave it out.
 turning movement: N left is from the northern arm of the junction to the left."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Passage:
+    """A vehicle at a line or zone; `video` is the number of the video."""
+
+    video: int
+    event: Event
+
+
+_Groups = Mapping[tuple[str, str], Sequence[_Passage]]
+"""Passages by line or zone and direction, or the first ones of trips by origin and destination."""
 
 
 class Survey:
@@ -54,19 +71,26 @@ class Survey:
 
     def __init__(self, videos: Mapping[str, Counts], settings: Settings) -> None:
         self.videos, self.settings = videos, settings
-        self.counts, self._length = list(videos.values()), settings.traffic.seconds
+        self.counts = list(videos.values())
         self._classes = tables.class_columns(self.counts)
         self._whole = self._intervals(None).periods[0]
-        events = (event for counts in self.counts for event in counts.events)
-        self._has_speeds = any(event.speed is not None for event in events)
+        directions: dict[tuple[str, str], list[_Passage]] = {
+            direction: [] for counts in self.counts for direction in counts.directions
+        }
+        for number, counts in enumerate(self.counts):
+            for event in counts.events:
+                directions[event.name, event.direction].append(_Passage(number, event))
+        self._directions: _Groups = directions
+        self._flows: _Groups = {
+            (origin, destination or NOWHERE): [_Passage(trip.video, trip.first) for trip in trips]
+            for (origin, destination), trips in tables.trips_by_flow(self.counts).items()
+        }
 
     def sheets(self, picture: Image | None = None) -> list[Sheet]:
         """Return the sheets of the workbook; `picture` is the scene, as for `Sheet`."""
-        counted_rows = tables.count_table(self.counts, self._length)
-        flow_rows = tables.flow_table(self.counts, self._length)
         single = {
-            "Intervals": self._by_class(("line or zone", "direction"), counted_rows),
-            "Flows": self._by_class(("from", "to"), flow_rows),
+            "Intervals": self._by_interval(_DIRECTION, self._directions),
+            "Flows": self._by_interval(_FLOW, self._flows),
             "Turning movements": self._movements(),
             "Zones": self._zones(),
             "Vehicles": self._vehicles(),
@@ -74,7 +98,7 @@ class Survey:
             "Notes": self.notes(),
         }
         summary = Sheet("Summary", [self.facts(), self.volumes()], picture)
-        return [summary, *(Sheet(name, [table]) for name, table in single.items() if table)]
+        return [summary, *(Sheet(name, [table]) for name, table in single.items() if table.rows)]
 
     def facts(self) -> SheetTable:
         """Return what the survey is, when and how it was made, and whether it is in doubt."""
@@ -106,45 +130,37 @@ class Survey:
         quarters = None
         with suppress(ConfigError):  # there is no clock
             quarters = self._intervals(measures.QUARTER)
-        groups: dict[tuple[str, str], list[tuple[int, Event]]] = {
-            direction: [] for counts in self.counts for direction in counts.directions
-        }
-        for index, counts in enumerate(self.counts):
-            for event in counts.events:
-                groups[event.name, event.direction].append((index, event))
-        flows = tables.vehicle_flows(self.counts)
-        groups["all flows", ""] = [(index, first) for index, first, _ in flows]
-        headings = "line or zone", "direction", *self._headings
-        peak = ["peak hour", "vehicles in it", "peak hour factor"]
-        peak += ["median km/h", "85 % km/h"] if self._has_speeds else []
-        rows = [[*pair, *self._volume(events, quarters)] for pair, events in groups.items()]
-        return SheetTable([*headings, *peak], rows, "Volumes")
+        trips = list(chain.from_iterable(self._flows.values()))
+        rows = [
+            [*pair, *self._numbers(passages), *_peak_hour(passages, quarters), *_speeds(passages)]
+            for pair, passages in {**self._directions, ("all flows", ""): trips}.items()
+        ]
+        headings = [*_DIRECTION, *self._headings, *_PEAK, *_SPEEDS]
+        return SheetTable(headings, rows, "Volumes").without_empty_columns()
 
-    def _volume(
-        self, events: Sequence[tuple[int, Event]], quarters: Intervals | None
-    ) -> list[Cell]:
-        numbers = Counter(class_of(event) for _, event in events)
-        cells, peak = self._cells(numbers, self._whole.observed), None
-        if quarters:
-            by_quarter = Counter(quarters.number(index, event.time) for index, event in events)
-            peak = measures.peak_hour(quarters.periods, by_quarter)
-        cells += (_time(peak.start), peak.vehicles, peak.factor) if peak else [None] * 3
-        speeds = [event.speed for _, event in events if event.speed is not None]
-        if self._has_speeds:
-            quantiles = np.quantile(speeds, [0.5, 0.85]).round(1).tolist() if speeds else [None] * 2
-            cells += quantiles
-        return cells
+    def flows(self) -> SheetTable:
+        """Return the number of vehicles in each flow, the largest flow first."""
+        rows = [[*flow, *self._numbers(trips)] for flow, trips in self._flows.items()]
+        return SheetTable([*_FLOW, *self._headings], rows)
 
-    def _by_class(self, names: tuple[str, str], rows: Sequence[CountRow | FlowRow]) -> SheetTable:
-        """Return a table with a column for each class, from rows with one class."""
+    def _by_interval(self, names: Sequence[str], groups: _Groups) -> SheetTable:
+        """Return the number of vehicles in each group and interval."""
+        intervals = self._intervals(self.settings.traffic.seconds)
+        numbers = defaultdict[tuple[int, tuple[str, str]], Counter[str]](Counter)
+        for pair, passages in groups.items():
+            for passage in passages:
+                number = intervals.number(passage.video, passage.event.time)
+                numbers[number, pair][class_of(passage.event)] += 1
+        rows = [
+            [*_interval(period), *pair, *self._cells(numbers[period.number, pair], period.observed)]
+            for period, pair in product(intervals.periods, groups)
+        ]
+        return SheetTable([*_TIMES, *names, *self._headings], rows)
 
-        def cells() -> Iterator[list[Cell]]:
-            for _, group in groupby(rows, key=lambda row: (row.start, _pair(row))):
-                by_class = list(group)
-                first, numbers = by_class[0], {row.class_name: row.count for row in by_class}
-                yield [*_interval(first), *_pair(first), *self._cells(numbers, first.observed)]
-
-        return SheetTable([*_TIMES, *names, *self._headings], cells())
+    def _numbers(self, passages: Sequence[_Passage]) -> list[Cell]:
+        """Return the cells below `_headings`, for the whole time."""
+        classes = Counter(class_of(passage.event) for passage in passages)
+        return self._cells(classes, self._whole.observed)
 
     @property
     def _headings(self) -> list[str]:
@@ -165,51 +181,52 @@ class Survey:
             cells.append(sum(count * units.get(name, 1.0) for name, count in numbers.items()))
         return cells
 
-    def _movements(self) -> SheetTable | None:
+    def _movements(self) -> SheetTable:
         """Return how vehicles turn, by interval; the arms are clockwise from the north."""
         arm_of = {line.name: line.approach for line in self.settings.traffic.lines}
         arms = [arm for arm in measures.APPROACHES if arm in arm_of.values()]
-        intervals, numbers = self._intervals(self._length), Counter[tuple[int, str, str]]()
-        for index, first, last in tables.vehicle_flows(self.counts):
-            origin, destination = arm_of.get(first.name), arm_of.get(last.name) if last else None
-            if origin and destination:
-                for turn in (measures.movement(origin, destination), _ALL):
-                    numbers[intervals.number(index, first.time), origin, turn] += 1
         turns = list(product(arms, (*measures.MOVEMENTS, _ALL)))
-        rows = [
+        intervals = self._intervals(self.settings.traffic.seconds)
+        numbers, sums = Counter[tuple[int, str, str]](), Counter[tuple[str, str]]()
+        for (first, last), trips in self._flows.items():
+            origin, destination = arm_of.get(first), arm_of.get(last)
+            if origin and destination:
+                turn = measures.movement(origin, destination)
+                for trip, name in product(trips, (turn, _ALL)):
+                    numbers[intervals.number(trip.video, trip.event.time), origin, name] += 1
+                    sums[origin, name] += 1
+        rows: list[list[Cell]] = [
             [*_interval(period), *(numbers[period.number, *turn] for turn in turns)]
             for period in intervals.periods
         ]
-        sums = [
-            sum(numbers[period.number, *turn] for period in intervals.periods) for turn in turns
-        ]
-        rows.append([_ALL, None, None, None, *sums])
-        headings = [*_TIMES, *map(" ".join, turns)]
-        return SheetTable(headings, rows) if arms else None
+        rows.append([_ALL, None, None, None, *(sums[turn] for turn in turns)])
+        return SheetTable([*_TIMES, *map(" ".join, turns)], rows if arms else [])
 
-    def _zones(self) -> SheetTable | None:
+    def _zones(self) -> SheetTable:
         """Return the use of zones in each interval."""
-        headings = "zone", "entered", "left", "mean", "max", "mean stay, s", "max stay, s"
+        headings = (
+            *("zone", "entered", "left", "mean inside", "max inside"),
+            *("mean stay, s", "max stay, s"),
+        )
         rows = []
-        for row in tables.zone_table(self.counts, self._length):
+        for row in tables.zone_table(self.counts, self.settings.traffic.seconds):
             use = row.entered, row.left, row.mean, row.max, row.mean_stay, row.max_stay
             rows.append([*_interval(row), row.name, *use])
-        return SheetTable([*_TIMES, *headings], rows) if rows else None
+        return SheetTable([*_TIMES, *headings], rows)
 
     def _vehicles(self) -> SheetTable:
         """Return every passage of a vehicle at a line or zone."""
         headings = "clock", "time in the file", "file", "line or zone", "direction", "vehicle"
         measured = "class", "score", "seconds in the zone", "km/h", "mean km/h"
 
-        def rows() -> Iterator[list[Cell]]:
-            for name, counts in self.videos.items():
-                for event in counts.events:
-                    clock = counts.clock.at(event.time) if counts.clock else None
-                    passage = event.name, event.direction, event.vehicle, class_of(event)
-                    values = event.score, event.seconds, event.speed, event.mean_speed
-                    yield [clock, _time(event.time), name, *passage, *values]
-
-        return SheetTable([*headings, *measured], rows())
+        rows = list[list[Cell]]()
+        for name, counts in self.videos.items():
+            for event in counts.events:
+                clock = counts.clock.at(event.time) if counts.clock else None
+                passage = event.name, event.direction, event.vehicle, class_of(event)
+                values = event.score, event.seconds, event.speed, event.mean_speed
+                rows.append([clock, _time(event.time), name, *passage, *values])
+        return SheetTable([*headings, *measured], rows).without_empty_columns()
 
     def files(self) -> SheetTable:
         """Return when each file was recorded, how that is known, and how one follows another."""
@@ -245,15 +262,25 @@ def _time(value: ClockTime) -> Cell:
     return timedelta(seconds=value) if isinstance(value, int | float) else value
 
 
-def _interval(row: CountRow | FlowRow | ZoneRow | Interval) -> list[Cell]:
+def _interval(row: ZoneRow | Interval) -> list[Cell]:
     """Return the cells below `_TIMES`."""
     return [_time(row.start), _time(row.end), row.observed, "part" if row.is_part else None]
 
 
-def _pair(row: CountRow | FlowRow) -> tuple[str, str]:
-    if isinstance(row, CountRow):
-        return row.name, row.direction
-    return row.origin, row.destination or NOWHERE
+def _peak_hour(passages: Sequence[_Passage], quarters: Intervals | None) -> list[Cell]:
+    """Return the cells below `_PEAK`."""
+    peak = None
+    if quarters:
+        numbers = Counter(quarters.number(item.video, item.event.time) for item in passages)
+        peak = measures.peak_hour(quarters.periods, numbers)
+    return [_time(peak.start), peak.vehicles, peak.factor] if peak else [None] * len(_PEAK)
+
+
+def _speeds(passages: Sequence[_Passage]) -> list[Cell]:
+    """Return the cells below `_SPEEDS`."""
+    speeds = [item.event.speed for item in passages if item.event.speed is not None]
+    quantiles: list[Cell] = np.quantile(speeds, [0.5, 0.85]).round(1).tolist() if speeds else []
+    return quantiles or [None] * len(_SPEEDS)
 
 
 def _seam(before: Interval | None, file: Interval) -> str | None:

@@ -2,10 +2,11 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from functools import cache
 from io import BytesIO
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +32,16 @@ class SheetTable:
     """A table in a sheet; without headings if it has none."""
 
     headings: Sequence[str]
-    rows: Iterable[Sequence[Cell]]
+    rows: Sequence[Sequence[Cell]]
     title: str = ""
+
+    def without_empty_columns(self) -> "SheetTable":
+        """Return the table without the columns in which no row has a value."""
+        filled = [
+            any(cell is not None for cell in column) for column in zip(*self.rows, strict=True)
+        ]
+        rows = [list(compress(row, filled)) for row in self.rows]
+        return replace(self, headings=list(compress(self.headings, filled)), rows=rows)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,7 @@ from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.clock import Clock, Span, extend
 from vdet.traffic.live import LiveTraffic
 from vdet.traffic.records import BestCrops, Crop, VehicleRecord
+from vdet.traffic.survey import Survey
 
 log = logging.getLogger("vdet")
 
@@ -168,7 +169,8 @@ class PageSink(BaseSink):
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.traffic
-        counter, start = traffic.counter, float(self.video.start)
+        counts, counter = traffic.counts(), traffic.counter
+        start = float(self.video.start)
         return VideoPage(
             video=self.video,
             frames=self._frames,
@@ -178,7 +180,7 @@ class PageSink(BaseSink):
             poster=self._poster(),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
-            counts=traffic.counts(),
+            survey=counts and Survey({self.video.path.name: counts}, settings),
             interval=settings.traffic.seconds or 60,
             clock=traffic.clock,
             pictures=self._pictures(),
