@@ -89,10 +89,20 @@ def test_several_videos_have_corrections_of_their_own(run: Run, folder: Path) ->
     review.write_text(HEAD.replace("red.mp4", "b.mp4") + MISSED)
     count = ("count", *paths, "-c", folder / "lines.yaml", "--corrections", review)
     result = run(*count, "--counts", totals, code=0)
-    assert result.out.endswith(f"{paths[1]}: corrected: 1 event, by b.yaml\n")
+    assert result.out.endswith(
+        f"{paths[1]}: corrected: 1 event, by b.yaml; 1 of 1 minute checked\n"
+    )
     videos = json.loads(totals.read_text())["videos"]
     assert [video.get("corrected") for video in videos.values()] == [
-        None, {"events": 1, "files": ["b.yaml"]},
+        None,
+        {
+            "events": 1, "files": ["b.yaml"], "checked": 1, "minutes": 1,
+            "estimates": [
+                {"group": None, "counted": 1, "true": 2, "low": 2, "high": 2, "more": 0},
+                {"group": "truck", "counted": 0, "true": 1, "low": 1, "high": 1, "more": 0},
+                {"group": "vehicle", "counted": 1, "true": 1, "low": 1, "high": 1, "more": 0},
+            ],
+        },
     ]  # fmt: skip
     review.write_text(HEAD + MISSED)
     result = run(*count, code=1)
@@ -119,12 +129,12 @@ def test_a_run_corrects_its_counts_records_and_page(
         ("gate", "truck"), ("gate", "bus"), ("yard", "bus"), ("yard", "bus"),
     ]  # fmt: skip
     flows = json.loads((folder / "f.json").read_text())
-    assert flows["corrected"] == {"events": 2, "files": ["c.yaml"]}
+    assert flows["corrected"]["files"] == ["c.yaml"]
     assert {row["class"] for row in flows["flows"] if row["count"]} == {"truck", "bus"}
     [record] = json.loads((folder / "v.json").read_text())
     assert (record["class"], record["corrected"]) == ("bus", ["c.yaml"])
     page = (folder / "page" / "page.html").read_text()
-    assert "These counts are corrected: 2 events, by c.yaml." in page
+    assert "These counts are corrected: 2 events, by c.yaml; 1 of 1 minute checked." in page
     review.write_text(HEAD.replace("red.mp4", "other.mp4") + MISSED)
     result = run(*detect, "--counts", folder / "d.csv", "--corrections", review, code=1)
     assert "c.yaml: corrects other.mp4" in result.err

@@ -28,7 +28,8 @@ from vdet.traffic.corrections import (
     read_corrections,
 )
 from vdet.traffic.counting import count_frames
-from vdet.traffic.counts import Counts, Event
+from vdet.traffic.counts import Corrected, Counts, Event
+from vdet.traffic.estimate import CountError, estimate
 
 SECOND = LINE.model_copy(update={"name": "second", "start": (200, 300), "end": (1000, 300)})
 SIZE = WIDTH, HEIGHT
@@ -98,7 +99,7 @@ def test_events_are_removed_added_renamed_and_turned(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert [one for one in ways(after) if one[0] == "second"] == [("second", "here", "truck")]
     assert {one.class_name for one in events_of(after, "zone")} == {"truck"}
-    assert str(after.corrected) == "corrected: 4 events, by c.yaml"
+    assert str(after.corrected) == "corrected: 4 events, by c.yaml; 0 of 1 minute checked"
     flows = [(row.origin, row.destination, row.class_name) for row in after.flows() if row.count]
     assert flows == [
         ("line", None, "bus"), ("line", None, "car"), ("second", "line", "truck"),
@@ -116,10 +117,29 @@ def test_a_vehicle_that_another_run_does_not_miss_is_not_added(tmp_path: Path) -
     rerun = replace(before, events=(*before.events, better))
     after = review.apply(rerun)
     assert ways(after)[-2:] == [("line", "away", "bus"), ("line", "away", "bus")]
-    assert str(after.corrected) == "corrected: 2 events, by c.yaml"
+    assert after.corrected
+    assert after.corrected.events == 2
     # Without what was counted rightly, the event may be of another vehicle.
     alone = Corrections.read(saved(tmp_path / "c.yaml", missed(8.5)))
     assert len(alone.apply(rerun).events) == len(rerun.events) + 1
+
+
+def test_checked_minutes_of_a_sample_say_how_many_passed_in_all(tmp_path: Path) -> None:
+    first = events_of(counts(), "line")[0]
+    cars = [replace(first, time=30 + 60.0 * n, id=n, vehicle=n) for n in range(10)]
+    video = replace(counts(), events=tuple(cars), spans=((0.0, 599.96),))
+    checked = [{"line": line, "start": 0, "end": 180} for line in ("line", "second")]
+    checked.append({"line": "line", "start": 240, "end": 300})
+    known = {"sample": {"seed": 1, "minutes": [2, 0, 1]}, "checked": checked}
+    path = saved(tmp_path / "c.yaml", missed(70), error(cars[5], "false"), **known)
+    corrected = Corrections.read(path).apply(video).corrected
+    assert corrected
+    assert str(corrected) == "corrected: 2 events, by c.yaml; 3 of 10 minutes checked"
+    errors = [CountError(minute=1, counted=None, true="bus")]
+    true = estimate({"car": [1] * 10}, errors, checked=range(3), drawn=range(3))
+    assert corrected.estimates == tuple(true)
+    unchecked = Corrections.read(saved(tmp_path / "c.yaml", missed(70))).apply(video).corrected
+    assert unchecked == Corrected(1, ("c.yaml",), checked=0, minutes=10)
 
 
 def test_half_a_second_is_near_enough_after_another_run(tmp_path: Path) -> None:
@@ -165,8 +185,8 @@ def test_two_reviewers_are_merged_unless_they_contradict_each_other(tmp_path: Pa
         return review.apply(before)
 
     both = merged(error(first, "class", "bus"), error(second, "false"), checked=True)
-    assert str(both.corrected) == "corrected: 2 events, by a.yaml, b.yaml"
-    assert merged() == both
+    assert str(both.corrected) == "corrected: 2 events, by a.yaml, b.yaml; 1 of 1 minute checked"
+    assert merged().events == both.events
     contradictions = (
         ([error(first, "class", "truck")], False),
         ([error(first, None)], False),
@@ -200,7 +220,8 @@ def test_several_videos_are_corrected_by_the_files_that_name_them(tmp_path: Path
         ("bus", 1), ("car", 2), ("bus", 4),
     ]  # fmt: skip
     assert [str(video.corrected) for video in after.values()] == [
-        "corrected: 1 event, by 1.yaml", "corrected: 2 events, by 2.yaml, 3.yaml",
+        "corrected: 1 event, by 1.yaml; 0 of 1 minute checked",
+        "corrected: 2 events, by 2.yaml, 3.yaml; 0 of 1 minute checked",
     ]  # fmt: skip
     for wrong in ({"a": "a.mp4"}, {"a": "a.mp4", "b": "a.mp4"}, {"a": None, "b": None}):
         with pytest.raises(ConfigError, match=r"[123]\.yaml: corrects .*, which must be"):

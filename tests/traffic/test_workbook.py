@@ -13,6 +13,7 @@ from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Corrected, Counts, Event
+from vdet.traffic.estimate import Estimate
 from vdet.traffic.measures import movement
 from vdet.traffic.survey import Survey
 from vdet.traffic.workbook import Sheet, SheetTable, write_workbook
@@ -56,6 +57,7 @@ def counts(begin: datetime, seconds: float, *events: Event, **values: Any) -> Co
 
 def morning() -> dict[str, Counts]:
     """An hour and ten minutes in two files: three vehicles cross the junction, one gets lost."""
+    bus = Estimate(group="bus", counted=0, true=1.2, low=0.9, high=2.7, more=9)
     hour = counts(
         BEGIN,
         3599.96,
@@ -67,7 +69,7 @@ def morning() -> dict[str, Counts]:
         event(1010, "east", "out", 2, "truck"),
         event(3599, "south", "in", 3, "car"),
         warnings=("east: this line is shorter than a vehicle; make it longer",),
-        corrected=Corrected(2, ("fixes.yaml",)),
+        corrected=Corrected(2, ("fixes.yaml",), checked=20, minutes=60, estimates=(bus,)),
     )
     rest = counts(
         BEGIN + timedelta(hours=1),
@@ -123,9 +125,14 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
         time_zone UTC+02:00 {empty}
         clock from_its_name {empty}
         interval 30min {empty}
-        checked corrected:_2_events,_by_fixes.yaml {empty}
+        checked 1_of_2_files {empty}
         conditions 2_doubts,_see_Notes {empty}
         program vdet_{__version__} {empty}
+        - - {empty}
+        Checks - {empty}
+        file corrected_by minutes_checked of_minutes events_corrected class counted estimated
+            at_least at_most - - - -
+        07.jsonl fixes.yaml 20 60 2 bus 0 1 1 3 - - - -
         - - {empty}
         Volumes - {empty}
         line_or_zone direction all_vehicles per_hour car truck tractor heavy,_% PCU peak_hour
@@ -262,7 +269,9 @@ def test_without_clocks_and_classes_there_are_times_of_the_video(tmp_path: Path)
     assert sheets["Vehicles"] == table("""
         time_in_the_file file line_or_zone direction vehicle class score
         0:00:05.500000 a\\udcff north in 1 vehicle 0.9""")
-    empty = written(tmp_path / "empty.xlsx", Survey({"a": replace(video, events=())}, plain))
+    empty = written(
+        tmp_path / "empty.xlsx", Survey({"a": replace(video, events=(), corrected=None)}, plain)
+    )
     assert [*lines_of(empty)] == ["Summary", "Intervals", "Zones", "Files", "Notes"]
 
 

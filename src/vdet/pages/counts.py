@@ -22,6 +22,7 @@ def counts_page(survey: Survey, picture: Image | None = None) -> str:
         "counts.html",
         title=facts.title,
         facts=page_table(facts)[1],
+        checks=page_table(survey.checks()),
         volumes=page_table(survey.volumes()),
         flows=page_table(survey.flows()),
         files=page_table(survey.files()),

@@ -198,7 +198,7 @@ def _text(cell: Cell) -> str:
         case datetime():
             return f"{cell:%Y-%m-%d %H:%M:%S}"
         case timedelta():
-            return clock_text(int(cell.total_seconds()), hours=True)
+            return clock_text(round(cell.total_seconds()), hours=True)
         case float():
             return f"{round(cell, 2):g}"
     return str(cell)

@@ -19,10 +19,13 @@ from vdet.config.section import Section
 from vdet.config.shapes import LineSettings, Name, Shape, Size, TrafficSettings, ZoneSettings
 from vdet.errors import ConfigError
 from vdet.labels.label import NO_ID
-from vdet.traffic.counts import Corrected, Counts, Event
+from vdet.traffic.counts import Corrected, Counts, Event, class_of
+from vdet.traffic.estimate import CountError, Estimate, estimate
 
 MAX_BYTES = 5_000_000
 """Size of a file of some 50,000 events."""
+_MINUTE = 60.0
+"""Seconds of the parts of a video that are checked at a time."""
 TOLERANCE = 0.5
 """Maximum seconds between two records of an event."""
 _DIFFERENCE = 0.01
@@ -234,7 +237,12 @@ class Corrections(Section):
                 f"{self.source} and {review.source}: contradict each other: {disputed[0]}; "
                 "correct one of them"
             )
-        update = {"events": (*self.events, *added), "checked": self.checked + review.checked}
+        samples = [review.sample for review in (self, review) if review.sample]
+        update = {
+            "events": (*self.events, *added),
+            "checked": self.checked + review.checked,
+            "sample": max(samples, key=lambda sample: len(sample.minutes), default=None),
+        }
         result = self.model_copy(update=update)
         result._files = self._files + review._files
         return result
@@ -244,6 +252,21 @@ class Corrections(Section):
         return any(
             span.line == event.name and span.start <= event.time < span.end for span in self.checked
         )
+
+    @property
+    def checked_lines(self) -> set[str]:
+        """The lines and zones that were checked, at least in a part of the video."""
+        return {span.line for span in self.checked}
+
+    def checked_minutes(self, counts: Counts) -> list[int]:
+        """Return the minutes of its video that were checked at all lines, from 0."""
+        checked = []
+        for minute in _minutes(counts):
+            time = counts.spans[0][0] + _MINUTE * minute + TOLERANCE
+            lines = {span.line for span in self.checked if span.start <= time < span.end}
+            if lines and lines == self.checked_lines:
+                checked.append(minute)
+        return checked
 
     def passed(self) -> list[ReviewedEvent]:
         """Return what passed: the events as they should have been counted."""
@@ -349,7 +372,8 @@ def apply_corrections(
 def _corrected(counts: Counts, review: Corrections, classes: dict[int, str]) -> Counts:
     """Return counts with the right events, and add the right classes of vehicles to `classes`."""
     events, changes = list[Event](), 0
-    for reviewed, event in review.paired_with(counts.events):
+    pairs = review.paired_with(counts.events)
+    for reviewed, event in pairs:
         right_event = reviewed.corrected(event) if reviewed else event
         changes += right_event != event
         if right_event:
@@ -362,8 +386,54 @@ def _corrected(counts: Counts, review: Corrections, classes: dict[int, str]) -> 
                     "correction; remove one"
                 )
     events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
-    corrected = Corrected(changes, tuple(Path(name).name for name in review._files))
+    checked, minutes = review.checked_minutes(counts), _minutes(counts)
+    corrected = Corrected(
+        events=changes,
+        files=tuple(Path(name).name for name in review._files),
+        checked=len(checked),
+        minutes=len(minutes),
+        estimates=_estimates(counts, review, pairs),
+    )
     return replace(counts, events=tuple(events), corrected=corrected)
+
+
+def _minute(counts: Counts, time: float) -> int:
+    """Return the minute of a time in the video, from 0 at the first frame."""
+    return int((time - counts.spans[0][0]) // _MINUTE)
+
+
+def _minutes(counts: Counts) -> list[int]:
+    """Return the minutes with video."""
+    spans = ((_minute(counts, first), _minute(counts, last)) for first, last in counts.spans)
+    minutes = {minute for first, last in spans for minute in range(first, last + 1)}
+    return sorted(minutes.union(_minute(counts, event.time) for event in counts.events))
+
+
+def _estimates(
+    counts: Counts,
+    review: Corrections,
+    pairs: Sequence[tuple[ReviewedEvent | None, Event | None]],
+) -> tuple[Estimate, ...]:
+    """Return the true number of events at the checked lines, as the page of the review does."""
+    numbers = {minute: number for number, minute in enumerate(_minutes(counts))}
+    checked = review.checked_minutes(counts)
+    events = [event for event in counts.events if event.name in review.checked_lines]
+    classes = {class_of(event) for event in events} or {UNKNOWN}
+    counted = {name: [0] * len(numbers) for name in classes}
+    for event in events:
+        counted[class_of(event)][numbers[_minute(counts, event.time)]] += 1
+    errors = [
+        CountError(
+            minute=numbers[minute],
+            counted=class_of(event) if event else None,
+            true=None if reviewed.error == "false" else reviewed.true_class,
+        )
+        for reviewed, event in pairs
+        if reviewed and reviewed.error and (minute := _minute(counts, reviewed.time)) in checked
+    ]
+    sample = review.sample.minutes if review.sample else ()
+    drawn = [numbers[minute] for minute in sample if minute in numbers]
+    return tuple(estimate(counted, errors, [numbers[minute] for minute in checked], drawn))
 
 
 def _is_same(first: Shape, second: Shape) -> bool:

@@ -13,6 +13,7 @@ from vdet.config.classes import UNKNOWN
 from vdet.errors import ArgumentError, counted, needing
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
+from vdet.traffic.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -180,13 +181,30 @@ class ZoneRow:
 
 @dataclass(frozen=True, slots=True)
 class Corrected:
-    """How counts were corrected: how many events, and by which files."""
+    """How counts were corrected.
+
+    Attributes
+    ----------
+    events
+        How many events were corrected.
+    files
+        The names of the files of corrections.
+    checked, minutes
+        How many minutes were checked, and how many there are.
+    estimates
+        The true number of events at the checked lines and zones, of all classes; empty if too few
+        minutes of a sample were checked.
+    """
 
     events: int
     files: tuple[str, ...]
+    checked: int
+    minutes: int
+    estimates: tuple[Estimate, ...] = ()
 
     def __str__(self) -> str:
-        return f"corrected: {counted(self.events, 'event')}, by {', '.join(self.files)}"
+        corrected = f"corrected: {counted(self.events, 'event')}, by {', '.join(self.files)}"
+        return f"{corrected}; {self.checked} of {counted(self.minutes, 'minute')} checked"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from vdet.traffic import counts as tables
 from vdet.traffic import measures
 from vdet.traffic.clock import ClockTime, Interval, Intervals
 from vdet.traffic.counts import Counts, Event, ZoneRow, class_of
+from vdet.traffic.estimate import Estimate
 from vdet.traffic.workbook import Cell, Sheet, SheetTable
 from vdet.version import __version__
 
@@ -35,7 +36,8 @@ factor is this number divided by four times that of the busiest quarter.
 heavy: the share of trucks and buses. all flows: each vehicle once, at its first line or zone.
 flow: from the first line or zone of a vehicle to the last, in the interval of the first. \
 {NOWHERE}: it was counted at one only; turning movements leave it out.
-turning movement: N left is from the northern arm of the junction to the left."""
+turning movement: N left is from the northern arm of the junction to the left.
+checks: the true number of passages at all checked lines and zones, with its interval of 95 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +99,15 @@ class Survey:
             "Files": self.files(),
             "Notes": self.notes(),
         }
-        summary = Sheet("Summary", [self.facts(), self.volumes()], picture)
+        tables = [table for table in (self.facts(), self.checks(), self.volumes()) if table.rows]
+        summary = Sheet("Summary", tables, picture)
         return [summary, *(Sheet(name, [table]) for name, table in single.items() if table.rows)]
 
     def facts(self) -> SheetTable:
         """Return what the survey is, when and how it was made, and whether it is in doubt."""
         survey, whole = self.settings.survey, self._whole
-        checks = [str(counts.corrected) for counts in self.counts if counts.corrected]
+        files = counted(len(self.videos), "file")
+        checked = sum(counts.corrected is not None for counts in self.counts)
         doubts = sum(len(counts.doubts + counts.warnings) for counts in self.counts)
         clocks = dict.fromkeys(counts.clock.source for counts in self.counts if counts.clock)
         times = (time for time in (whole.start, whole.end) if isinstance(time, datetime))
@@ -111,14 +115,14 @@ class Survey:
         facts: dict[str, Cell] = {
             "surveyor": survey.surveyor,
             "weather": survey.weather,
-            "files": counted(len(self.videos), "file"),
+            "files": files,
             "first frame": _time(whole.start),
             "last frame": _time(whole.end),
             "observed": timedelta(seconds=whole.observed),
             "time zone": ", ".join(zones) or None,
             "clock": ", ".join(clocks) or "unknown: times are those of the video",
             "interval": self.settings.traffic.interval or "the whole time",
-            "checked": "; ".join(checks) or "no, counted automatically",
+            "checked": f"{checked} of {files}" if checked else "no, counted automatically",
             "conditions": f"{counted(doubts, 'doubt')}, see Notes" if doubts else "no doubts",
             "program": f"vdet {__version__}",
         }
@@ -241,6 +245,20 @@ class Survey:
         headings = "file", "first frame", "last frame", "observed, s", "after the file before"
         return SheetTable([*headings, "clock", "events", "doubts"], rows)
 
+    def checks(self) -> SheetTable:
+        """Return what was checked in each file, and how many vehicles passed by that."""
+        rows = list[list[Cell]]()
+        for name, counts in self.videos.items():
+            if corrected := counts.corrected:
+                files = ", ".join(corrected.files)
+                minutes = corrected.checked, corrected.minutes, corrected.events
+                rows += [
+                    [name, files, *minutes, *_estimate(item)] for item in corrected.estimates
+                ] or [[name, files, *minutes, *[None] * 5]]
+        headings = "file", "corrected by", "minutes checked", "of minutes", "events corrected"
+        numbers = "class", "counted", "estimated", "at least", "at most"
+        return SheetTable([*headings, *numbers], rows, "Checks")
+
     def notes(self) -> SheetTable:
         """Return the warnings and doubts of each file, and what the sheets mean."""
         rows: list[list[Cell]] = [
@@ -281,6 +299,11 @@ def _speeds(passages: Sequence[_Passage]) -> list[Cell]:
     speeds = [item.event.speed for item in passages if item.event.speed is not None]
     quantiles: list[Cell] = np.quantile(speeds, [0.5, 0.85]).round(1).tolist() if speeds else []
     return quantiles or [None] * len(_SPEEDS)
+
+
+def _estimate(item: Estimate) -> list[Cell]:
+    group = item.group or "all vehicles"
+    return [group, item.counted, round(item.true), round(item.low), round(item.high)]
 
 
 def _seam(before: Interval | None, file: Interval) -> str | None:

@@ -180,7 +180,7 @@ class PageSink(BaseSink):
             poster=self._poster(),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
-            survey=counts and Survey({self.video.path.name: counts}, settings),
+            survey=Survey({self.video.path.name: counts}, settings) if counts else None,
             interval=settings.traffic.seconds or 60,
             clock=traffic.clock,
             pictures=self._pictures(),
