@@ -96,8 +96,8 @@ def count(
             announce(f"{name}: begins {result.clock}")
         for warning in result.warnings:
             LOG.warning("%s: %s", name, warning)
-    found = {event.class_name for result in videos.values() for event in result.events}
-    for name in {*our_names(classes)} - {*found, *OUR_NAMES}:
+    counted_classes = {event.class_name for result in videos.values() for event in result.events}
+    for name in {*our_names(classes)} - {*counted_classes, *OUR_NAMES}:
         LOG.warning("--class %s: no vehicle of this class was counted", name)
     with files:
         for output in outputs:
@@ -116,14 +116,13 @@ def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image
     from vdet.pages.counts import counts_page
     from vdet.pages.render import PAGE_NAME
     from vdet.pages.traffic import scene_picture
-    from vdet.traffic.counts import joined_counts
     from vdet.traffic.output import counts_content, flows_content, is_workbook
     from vdet.traffic.tables import write_content
     from vdet.traffic.workbook import write_workbook
 
     traffic = survey.settings.traffic
     if scene is not None:
-        scene = scene_picture(scene, traffic, joined_counts(survey.counts))
+        scene = scene_picture(scene, traffic, survey.counts)
     if output.sink == "page":
         page = files.stage_folder(output.path) / PAGE_NAME
         return write_text(page, counts_page(survey, scene))

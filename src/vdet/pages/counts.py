@@ -8,7 +8,7 @@ from vdet.pages.charts import Plot, interval_plot, time_axis
 from vdet.pages.render import render
 from vdet.pages.traffic import page_table
 from vdet.traffic.clock import Intervals
-from vdet.traffic.counts import Counts
+from vdet.traffic.counts import Counts, directions_of
 from vdet.traffic.survey import Survey
 
 _INTERVAL = 900
@@ -41,16 +41,13 @@ def _plot(counts: list[Counts], length: int) -> Plot | None:
         return None
     intervals = Intervals([(video.clock, video.spans) for video in counts], length)
     first, last = intervals.periods[0], intervals.periods[-1]
-    directions = dict.fromkeys(direction for video in counts for direction in video.directions)
-    zones = {name for video in counts for name in video.zones}
-    has_lines = any(name not in zones for name, _ in directions)
+    directions, zones = directions_of(counts), {name for video in counts for name in video.zones}
+    names = {name for name, _ in directions} - zones or zones
     series = {
-        f"{name}: {direction}": Counter[float]()
-        for name, direction in directions
-        if not (has_lines and name in zones)
+        f"{name}: {direction}": Counter[float]() for name, direction in directions if name in names
     }
     for index, video in enumerate(counts):
-        for event in (event for event in video.events if not (has_lines and event.name in zones)):
+        for event in (event for event in video.events if event.name in names):
             start = intervals.number(index, event.time) - first.number
             series[f"{event.name}: {event.direction}"][start] += 1
     zero = None

@@ -98,7 +98,7 @@ class Drawing:
         paths = {
             key: path.points.tolist() for path in self.paths for key in np.unique(path.ids).tolist()
         }
-        return traffic_marks(self._size, (*lines, *zones), counts, paths)
+        return traffic_marks(self._size, (*lines, *zones), [counts], paths)
 
 
 def split(

@@ -21,7 +21,7 @@ from vdet.errors import ConfigError, clock_text
 from vdet.media.images import read_image
 from vdet.pages.render import Table
 from vdet.polygons import Point
-from vdet.traffic.counts import Counts, Direction, trips_by_flow
+from vdet.traffic.counts import Counts, Direction, direction_totals, trips_by_flow
 from vdet.traffic.crossings import Border, Line, lines_and_zones
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.workbook import Cell, SheetTable
@@ -54,16 +54,16 @@ class Mark:
 def traffic_marks(
     size: tuple[int, int],
     borders: Sequence[Border],
-    counts: Counts,
+    videos: Sequence[Counts],
     paths: Mapping[int, Sequence[Point]],
 ) -> list[Mark]:
     """Return the marks to draw on frames of this width and height, pixels.
 
     `paths` are those of tracks by id, pixels.
     """
-    totals = {(total.name, total.direction): total.count for total in counts.totals}
+    totals = {(total.name, total.direction): total.count for total in direction_totals(videos)}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
-    flows = trips_by_flow([counts]).values()
+    flows = trips_by_flow(videos).values()
     maximum = max(map(len, flows), default=1)
     for number, trips in enumerate(flows):
         last_events = [trip.last or trip.first for trip in trips]
@@ -174,13 +174,13 @@ def survey_image(settings: Settings) -> Image | None:
 def scene_picture(
     image: Image,
     settings: TrafficSettings,
-    counts: Counts,
+    videos: Sequence[Counts],
     paths: Mapping[int, Sequence[Point]] = MappingProxyType({}),
 ) -> Image:
     """Return a frame with lines, zones, counts, and flows where their `paths` are known."""
     height, width = image.shape[:2]
     lines, zones = lines_and_zones(settings, width, height)
-    return with_marks(image, traffic_marks((width, height), (*lines, *zones), counts, paths))
+    return with_marks(image, traffic_marks((width, height), (*lines, *zones), videos, paths))
 
 
 def page_table(table: SheetTable) -> Table:

@@ -15,10 +15,9 @@ from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
 from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
 from vdet.pages.render import jpeg_uri, render
-from vdet.pages.traffic import page_table, path_marks, traffic_marks, with_marks
+from vdet.pages.traffic import page_table, path_marks, scene_picture, with_marks
 from vdet.traffic.clock import Clock, Intervals, Span
 from vdet.traffic.counts import Counts
-from vdet.traffic.crossings import Border
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
 from vdet.traffic.survey import Survey
@@ -78,8 +77,6 @@ class VideoPage:
         Start time of the video; None if unknown.
     pictures
         By id, the address of the image of a vehicle relative to the page, if the run writes one.
-    borders
-        The lines and zones at which vehicles were counted.
     findings
         Reasons to doubt the results.
     clips
@@ -100,7 +97,6 @@ class VideoPage:
     interval: int = 60
     clock: Clock | None = None
     pictures: Mapping[int, str] = field(default_factory=dict)
-    borders: Sequence[Border] = ()
     findings: Sequence[Finding] = ()
     clips: Mapping[int, str] = field(default_factory=dict)
     review: str = ""
@@ -254,12 +250,11 @@ class VideoPage:
 
     def _traffic(self) -> Image | None:
         """Return the poster with lines, zones and flows."""
-        if self.poster is None or not self.counts:
+        if self.poster is None or not self.survey:
             return None
-        height, width = self.poster.shape[:2]
         paths = {record.id: record.path for record in self.records}
-        marks = traffic_marks((width, height), self.borders, self.counts, paths)
-        return with_marks(self.poster, marks)
+        traffic = self.survey.settings.traffic
+        return scene_picture(self.poster, traffic, self.survey.counts, paths)
 
     def _paths(self) -> Image | None:
         """Return the poster with the paths of all vehicles."""

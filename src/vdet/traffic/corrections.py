@@ -249,24 +249,16 @@ class Corrections(Section):
 
     def has_checked(self, event: ReviewedEvent | Event) -> bool:
         """Return whether the line was checked at the time of an event."""
-        return any(
-            span.line == event.name and span.start <= event.time < span.end for span in self.checked
-        )
+        return event.name in self.lines_checked_at(event.time)
+
+    def lines_checked_at(self, time: float) -> set[str]:
+        """Return the lines and zones that were checked at this time, seconds in the video."""
+        return {span.line for span in self.checked if span.start <= time < span.end}
 
     @property
     def checked_lines(self) -> set[str]:
         """The lines and zones that were checked, at least in a part of the video."""
         return {span.line for span in self.checked}
-
-    def checked_minutes(self, counts: Counts) -> list[int]:
-        """Return the minutes of its video that were checked at all lines, from 0."""
-        checked = []
-        for minute in _minutes(counts):
-            time = counts.spans[0][0] + _MINUTE * minute + TOLERANCE
-            lines = {span.line for span in self.checked if span.start <= time < span.end}
-            if lines and lines == self.checked_lines:
-                checked.append(minute)
-        return checked
 
     def passed(self) -> list[ReviewedEvent]:
         """Return what passed: the events as they should have been counted."""
@@ -386,14 +378,10 @@ def _corrected(counts: Counts, review: Corrections, classes: dict[int, str]) -> 
                     "correction; remove one"
                 )
     events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
-    checked, minutes = review.checked_minutes(counts), _minutes(counts)
-    corrected = Corrected(
-        events=changes,
-        files=tuple(Path(name).name for name in review._files),
-        checked=len(checked),
-        minutes=len(minutes),
-        estimates=_estimates(counts, review, pairs),
-    )
+    files = tuple(Path(name).name for name in review._files)
+    minutes, checked = _minutes(counts), _checked_minutes(counts, review)
+    estimates = _estimates(counts, review, pairs)
+    corrected = Corrected(changes, files, len(checked), len(minutes), estimates)
     return replace(counts, events=tuple(events), corrected=corrected)
 
 
@@ -409,6 +397,18 @@ def _minutes(counts: Counts) -> list[int]:
     return sorted(minutes.union(_minute(counts, event.time) for event in counts.events))
 
 
+def _checked_minutes(counts: Counts, review: Corrections) -> list[int]:
+    """Return the minutes that were checked at all lines which were checked at any time."""
+    if not review.checked:
+        return []
+    times = {minute: counts.spans[0][0] + _MINUTE * minute for minute in _minutes(counts)}
+    return [
+        minute
+        for minute, start in times.items()
+        if review.lines_checked_at(start + TOLERANCE) == review.checked_lines
+    ]
+
+
 def _estimates(
     counts: Counts,
     review: Corrections,
@@ -416,7 +416,7 @@ def _estimates(
 ) -> tuple[Estimate, ...]:
     """Return the true number of events at the checked lines, as the page of the review does."""
     numbers = {minute: number for number, minute in enumerate(_minutes(counts))}
-    checked = review.checked_minutes(counts)
+    checked = _checked_minutes(counts, review)
     events = [event for event in counts.events if event.name in review.checked_lines]
     classes = {class_of(event) for event in events} or {UNKNOWN}
     counted = {name: [0] * len(numbers) for name in classes}

@@ -5,7 +5,7 @@ Tables cover the whole video or intervals of it. Several videos have one table.
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -279,15 +279,9 @@ class Counts:
         return pd.DataFrame(self.table(interval), columns=names)
 
 
-def joined_counts(videos: Sequence[Counts]) -> Counts:
-    """Return the counts of several videos at the same lines as those of one, without times."""
-    events = tuple(event for video in videos for event in video.events)
-    return replace(videos[0], events=events, spans=((0.0, 0.0),), clock=None)
-
-
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
     """Return the totals of each direction over all videos."""
-    classes = {key: Counter[str]() for key in _directions(videos)}
+    classes = {key: Counter[str]() for key in directions_of(videos)}
     for event in (event for video in videos for event in video.events):
         classes[event.name, event.direction][event.class_name or ""] += 1
     return tuple(
@@ -322,7 +316,7 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
         for index, video in enumerate(videos)
         for event in video.events
     )
-    return [CountRow(*values) for values in _rows(intervals, counts, _directions(videos))]
+    return [CountRow(*values) for values in _rows(intervals, counts, directions_of(videos))]
 
 
 def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
@@ -443,7 +437,8 @@ def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
     return Intervals([(video.clock, video.spans) for video in videos], interval)
 
 
-def _directions(videos: Sequence[Counts]) -> list[Direction]:
+def directions_of(videos: Sequence[Counts]) -> list[Direction]:
+    """Return each direction of each line and zone."""
     return list(dict.fromkeys(direction for video in videos for direction in video.directions))
 
 

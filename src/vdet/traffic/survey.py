@@ -77,7 +77,7 @@ class Survey:
         self._classes = tables.class_columns(self.counts)
         self._whole = self._intervals(None).periods[0]
         directions: dict[tuple[str, str], list[_Passage]] = {
-            direction: [] for counts in self.counts for direction in counts.directions
+            direction: [] for direction in tables.directions_of(self.counts)
         }
         for number, counts in enumerate(self.counts):
             for event in counts.events:

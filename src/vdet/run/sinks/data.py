@@ -225,7 +225,7 @@ class WorkbookSink(BaseSink):
         assert counts
         assert image is not None  # a run has frames
         paths = {vehicle.id: vehicle.path for vehicle in self.traffic.vehicles}
-        picture = scene_picture(image, settings.traffic, counts, paths)
+        picture = scene_picture(image, settings.traffic, [counts], paths)
         survey = Survey({self.video.path.name: counts}, settings)
         write_workbook(self.context.files.stage(self.path), survey.sheets(picture))
 

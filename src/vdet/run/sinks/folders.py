@@ -169,8 +169,7 @@ class PageSink(BaseSink):
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.traffic
-        counts, counter = traffic.counts(), traffic.counter
-        start = float(self.video.start)
+        counts, start = traffic.counts(), float(self.video.start)
         return VideoPage(
             video=self.video,
             frames=self._frames,
@@ -184,7 +183,6 @@ class PageSink(BaseSink):
             interval=settings.traffic.seconds or 60,
             clock=traffic.clock,
             pictures=self._pictures(),
-            borders=counter.borders if counter else (),
             findings=findings_in(self.context.facts).items,
             clips=self._clips(),
             review=self._review(),
