@@ -33,7 +33,7 @@ from vdet.traffic.estimate import CountError, estimate
 
 SECOND = LINE.model_copy(update={"name": "second", "start": (200, 300), "end": (1000, 300)})
 SIZE = WIDTH, HEIGHT
-SETTINGS = settings_for(LINE, SECOND, ZONE)
+SETTINGS = settings_for(LINE.model_copy(update={"approach": "N"}), SECOND, ZONE)
 BORDERS = [
     {"name": one.name, "start": [*one.start], "end": [*one.end], "left": "away", "right": "here"}
     for one in (LINE, SECOND)

@@ -238,7 +238,7 @@ def test_zones_vehicles_files_and_notes(book: Path) -> None:
         file note
         07.jsonl east:_this_line_is_shorter_than_a_vehicle;_make_it_longer
         08.jsonl the_image_is_dark_[dark]""")
-    assert sheets["Notes"][-1] == "- PCU:_truck_2.5;_others_1."
+    assert sheets["Notes"][-1] == "- PCU:_truck_2.5;_all_other_classes_1."
 
 
 def test_sheets_are_ready_to_print(book: Path) -> None:

@@ -23,7 +23,7 @@ _COLUMNS = (
     *("id", "first", "seconds", "speed", "lines", "motion", "distance", "lane"),
     *("side", "size"),
 )
-_UNKNOWN = (None, "")  # empty values
+_EMPTY = (None, "")
 Summaries = Mapping[str, Mapping[str, Any]]
 """The `summary` of an output of each video, by its name; `page` is relative to its folder."""
 FactsT = TypeVar("FactsT", bound=BaseModel)
@@ -147,15 +147,15 @@ def table_json(parts: Sequence[Part]) -> str:
         "pages": [part.page for part in parts],
         "starts": [part.start for part in parts],
         "counts": [len(part.rows) for part in parts],
-        **{name: values for name, values in columns.items() if _is_known(values)},
+        **{name: values for name, values in columns.items() if _has_values(values)},
     }
     text = json.dumps(table, separators=(",", ":"), ensure_ascii=False)
     return text.replace("<", "\\u003c")  # so that nothing in it ends the enclosing element
 
 
-def _is_known(values: Sequence[Any]) -> bool:
+def _has_values(column: Sequence[Any]) -> bool:
     """Return whether a column has a value; without rows, all columns are kept."""
-    return not values or any(value not in _UNKNOWN for value in values)
+    return not column or any(value not in _EMPTY for value in column)
 
 
 def _plain_seconds(clock: str | None) -> int | None:

@@ -440,7 +440,7 @@ def _is_same(first: Shape, second: Shape) -> bool:
     """Return whether two lines or zones have the same name, directions and points."""
     names, points = [], []
     for shape in (first, second):
-        names.append(shape.model_dump(exclude={"size", *shape.point_fields}))
+        names.append(shape.model_dump(include={"name", "left", "right"}))
         points.append(np.vstack([getattr(shape, field) for field in shape.point_fields]))
     is_same = names[0] == names[1] and points[0].shape == points[1].shape
     return is_same and bool(np.hypot(*(points[0] - points[1]).T).max() <= _PIXELS)

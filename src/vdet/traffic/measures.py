@@ -1,7 +1,7 @@
 """Measures of traffic engineers: peak hours and turning movements.
 
 The peak hour and its factor are those of the Highway Capacity Manual: the four successive quarters
-of an hour with the most vehicles, and that number divided by four times that of the busiest one.
+of an hour with the most vehicles, and their number divided by four times that of the busiest.
 """
 
 from collections.abc import Mapping, Sequence

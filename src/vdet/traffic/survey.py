@@ -25,6 +25,7 @@ _TIMES = "start", "end", "observed, s", "part"
 _DIRECTION = "line or zone", "direction"
 _FLOW = "from", "to"
 _PEAK = "peak hour", "vehicles in it", "peak hour factor"
+_ESTIMATE = "class", "counted", "estimated", "at least", "at most"
 _SPEEDS = "median km/h", "85 % km/h"
 _ALL = "all"
 _JOINED = 2.0
@@ -99,8 +100,9 @@ class Survey:
             "Files": self.files(),
             "Notes": self.notes(),
         }
-        tables = [table for table in (self.facts(), self.checks(), self.volumes()) if table.rows]
-        summary = Sheet("Summary", tables, picture)
+        checks = self.checks()
+        top = [self.facts(), *([checks] if checks.rows else []), self.volumes()]
+        summary = Sheet("Summary", top, picture)
         return [summary, *(Sheet(name, [table]) for name, table in single.items() if table.rows)]
 
     def facts(self) -> SheetTable:
@@ -130,7 +132,7 @@ class Survey:
         return SheetTable((), rows, survey.site or "Traffic survey")
 
     def volumes(self) -> SheetTable:
-        """Return the number of vehicles in each direction, and their peak hour."""
+        """Return the number of vehicles in each direction, their peak hour and their speeds."""
         quarters = None
         with suppress(ConfigError):  # there is no clock
             quarters = self._intervals(measures.QUARTER)
@@ -208,21 +210,18 @@ class Survey:
 
     def _zones(self) -> SheetTable:
         """Return the use of zones in each interval."""
-        headings = (
-            *("zone", "entered", "left", "mean inside", "max inside"),
-            *("mean stay, s", "max stay, s"),
-        )
+        headings = "zone", "entered", "left", "mean inside", "max inside"
+        stays = "mean stay, s", "max stay, s"
         rows = []
         for row in tables.zone_table(self.counts, self.settings.traffic.seconds):
             use = row.entered, row.left, row.mean, row.max, row.mean_stay, row.max_stay
             rows.append([*_interval(row), row.name, *use])
-        return SheetTable([*_TIMES, *headings], rows)
+        return SheetTable([*_TIMES, *headings, *stays], rows)
 
     def _vehicles(self) -> SheetTable:
         """Return every passage of a vehicle at a line or zone."""
         headings = "clock", "time in the file", "file", "line or zone", "direction", "vehicle"
         measured = "class", "score", "seconds in the zone", "km/h", "mean km/h"
-
         rows = list[list[Cell]]()
         for name, counts in self.videos.items():
             for event in counts.events:
@@ -246,18 +245,16 @@ class Survey:
         return SheetTable([*headings, "clock", "events", "doubts"], rows)
 
     def checks(self) -> SheetTable:
-        """Return what was checked in each file, and how many vehicles passed by that."""
+        """Return what was checked in each file, and the estimate of the true numbers."""
         rows = list[list[Cell]]()
         for name, counts in self.videos.items():
             if corrected := counts.corrected:
-                files = ", ".join(corrected.files)
-                minutes = corrected.checked, corrected.minutes, corrected.events
-                rows += [
-                    [name, files, *minutes, *_estimate(item)] for item in corrected.estimates
-                ] or [[name, files, *minutes, *[None] * 5]]
+                numbers = corrected.checked, corrected.minutes, corrected.events
+                check = [name, ", ".join(corrected.files), *numbers]
+                estimates = map(_estimate, corrected.estimates or [None])
+                rows += [[*check, *estimate] for estimate in estimates]
         headings = "file", "corrected by", "minutes checked", "of minutes", "events corrected"
-        numbers = "class", "counted", "estimated", "at least", "at most"
-        return SheetTable([*headings, *numbers], rows, "Checks")
+        return SheetTable([*headings, *_ESTIMATE], rows, "Checks")
 
     def notes(self) -> SheetTable:
         """Return the warnings and doubts of each file, and what the sheets mean."""
@@ -268,7 +265,7 @@ class Survey:
         ]
         units = [f"{name} {number:g}" for name, number in self.settings.traffic.pcu.items()]
         rows += [["", text] for text in _NOTES.splitlines()]
-        rows += [["", f"PCU: {', '.join(units)}; others 1."]] if units else []
+        rows += [["", f"PCU: {', '.join(units)}; all other classes 1."]] if units else []
         return SheetTable(("file", "note"), rows)
 
     def _intervals(self, length: int | None) -> Intervals:
@@ -301,7 +298,10 @@ def _speeds(passages: Sequence[_Passage]) -> list[Cell]:
     return quantiles or [None] * len(_SPEEDS)
 
 
-def _estimate(item: Estimate) -> list[Cell]:
+def _estimate(item: Estimate | None) -> list[Cell]:
+    """Return the cells below `_ESTIMATE`."""
+    if item is None:
+        return [None] * len(_ESTIMATE)
     group = item.group or "all vehicles"
     return [group, item.counted, round(item.true), round(item.low), round(item.high)]
 

@@ -52,10 +52,10 @@ def read_table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
         raise TruthError(f"{path}: cannot be read as a table: {error}") from error
     if not set(columns) <= set(reader.fieldnames or ()):
         raise TruthError(f"{path}: must have the columns {', '.join(columns)}")
-    return [{name: _as_given(cell) for name, cell in row.items()} for row in rows]
+    return [{name: _without_apostrophe(cell) for name, cell in row.items()} for row in rows]
 
 
-def _as_given(cell: str) -> str:
+def _without_apostrophe(cell: str) -> str:
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell[1:]) else cell
 
 
