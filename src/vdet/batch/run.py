@@ -18,7 +18,7 @@ from vdet.batch.task import (
 )
 from vdet.detect.factory import load_detector
 from vdet.errors import BatchError, OutputError
-from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
+from vdet.files import FileIds, OutputFiles, make_folder, output_errors, remove_stale
 from vdet.run.inputs import input_files
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BatchTotal, check_sinks, sink_kind
@@ -85,18 +85,8 @@ def make_plan(
     sources = find_sources(clips)
     _reject_nested(clips, sources, folder)
     settings_files = tuple(path.absolute() for path in common.settings_files)
-    runs = [
-        replace(
-            common,
-            settings=settings,
-            settings_files=settings_files,
-            source=source.path,
-            outputs=tuple(
-                _named(output, folder / source.relative_path) for output in common.outputs
-            ),
-        )
-        for source in sources
-    ]
+    common = replace(common, settings=settings, settings_files=settings_files)
+    runs = [_run_of(source, folder, common) for source in sources]
     totals = tuple(
         TotalFile(folder / f"{kind.name}{kind.suffix or ending}", kind, number, ending)
         for number, output in enumerate(common.outputs)
@@ -117,19 +107,29 @@ def make_plan(
             else:
                 runs.append(allow_replacing(run, written))
     for run in runs:
-        try:
-            files = OutputFiles(overwrite=run.overwrite, inputs=inputs)
-            check_sinks(run.outputs, files, makes_folder=True)
-        except OutputError as error:
-            text = str(error).replace(
-                "to replace it", "to replace it, or --skip-existing to keep it"
-            )
-            raise OutputError(text) from error
+        _check_outputs(run, inputs)
     replaces_totals = common.overwrite or (skip_existing and manifest.exists())
     total_files = OutputFiles(overwrite=replaces_totals, inputs=inputs)
     for total in totals:
         total_files.check(total.path, makes_folder=True)
     return Plan(folder, tuple(runs), tuple(skipped), totals)
+
+
+def _run_of(source: InputVideo, folder: Path, common: Run) -> Run:
+    """Return the run of a video, with its outputs in `folder`."""
+    video = folder / source.relative_path
+    outputs = tuple(_named(output, video) for output in common.outputs)
+    return replace(common, source=source.path, outputs=outputs)
+
+
+def _check_outputs(run: Run, inputs: FileIds) -> None:
+    """Raise `OutputError` if an output of a run cannot be written."""
+    try:
+        files = OutputFiles(overwrite=run.overwrite, inputs=inputs)
+        check_sinks(run.outputs, files, makes_folder=True)
+    except OutputError as error:
+        text = str(error).replace("to replace it", "to replace it, or --skip-existing to keep it")
+        raise OutputError(text) from error
 
 
 def _named(output: Output, video: Path) -> Output:

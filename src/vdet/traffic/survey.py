@@ -138,7 +138,7 @@ class Survey:
             quarters = self._intervals(measures.QUARTER)
         trips = list(chain.from_iterable(self._flows.values()))
         rows = [
-            [*pair, *self._numbers(passages), *_peak_hour(passages, quarters), *_speeds(passages)]
+            [*pair, *self._cells(passages), *_peak_hour(passages, quarters), *_speeds(passages)]
             for pair, passages in {**self._directions, ("all flows", ""): trips}.items()
         ]
         headings = [*_DIRECTION, *self._headings, *_PEAK, *_SPEEDS]
@@ -146,27 +146,22 @@ class Survey:
 
     def flows(self) -> SheetTable:
         """Return the number of vehicles in each flow, the largest flow first."""
-        rows = [[*flow, *self._numbers(trips)] for flow, trips in self._flows.items()]
+        rows = [[*flow, *self._cells(trips)] for flow, trips in self._flows.items()]
         return SheetTable([*_FLOW, *self._headings], rows)
 
     def _by_interval(self, names: Sequence[str], groups: _Groups) -> SheetTable:
         """Return the number of vehicles in each group and interval."""
         intervals = self._intervals(self.settings.traffic.seconds)
-        numbers = defaultdict[tuple[int, tuple[str, str]], Counter[str]](Counter)
+        passages_in = defaultdict[tuple[int, tuple[str, str]], list[_Passage]](list)
         for pair, passages in groups.items():
             for passage in passages:
                 number = intervals.number(passage.video, passage.event.time)
-                numbers[number, pair][class_of(passage.event)] += 1
+                passages_in[number, pair].append(passage)
         rows = [
-            [*_interval(period), *pair, *self._cells(numbers[period.number, pair], period.observed)]
+            [*_interval(period), *pair, *self._cells(passages_in[period.number, pair], period)]
             for period, pair in product(intervals.periods, groups)
         ]
         return SheetTable([*_TIMES, *names, *self._headings], rows)
-
-    def _numbers(self, passages: Sequence[_Passage]) -> list[Cell]:
-        """Return the cells below `_headings`, for the whole time."""
-        classes = Counter(class_of(passage.event) for passage in passages)
-        return self._cells(classes, self._whole.observed)
 
     @property
     def _headings(self) -> list[str]:
@@ -175,13 +170,14 @@ class Survey:
         units = ["PCU"] if self.settings.traffic.pcu else []
         return ["all vehicles", "per hour", *classes, *units]
 
-    def _cells(self, numbers: Mapping[str, int], seconds: float) -> list[Cell]:
-        """Return the cells below `_headings`, for vehicles of each class in seconds of video."""
-        total, units = sum(numbers.values()), self.settings.traffic.pcu
-        cells: list[Cell] = [total, tables.per_hour(total, seconds)]
+    def _cells(self, passages: Sequence[_Passage], period: Interval | None = None) -> list[Cell]:
+        """Return the cells below `_headings`, for passages in a period; None: the whole time."""
+        numbers = Counter(class_of(passage.event) for passage in passages)
+        total, units = len(passages), self.settings.traffic.pcu
+        cells: list[Cell] = [total, tables.per_hour(total, (period or self._whole).observed)]
         if len(self._classes) > 1:
-            heavy = sum(numbers.get(name, 0) for name in measures.HEAVY)
-            cells += [numbers.get(name, 0) for name in self._classes]
+            heavy = sum(numbers[name] for name in measures.HEAVY)
+            cells += [numbers[name] for name in self._classes]
             cells.append(round(100 * heavy / total, 1) if total else None)
         if units:
             cells.append(sum(count * units.get(name, 1.0) for name, count in numbers.items()))
@@ -250,9 +246,8 @@ class Survey:
         for name, counts in self.videos.items():
             if corrected := counts.corrected:
                 numbers = corrected.checked, corrected.minutes, corrected.events
-                check = [name, ", ".join(corrected.files), *numbers]
-                estimates = map(_estimate, corrected.estimates or [None])
-                rows += [[*check, *estimate] for estimate in estimates]
+                for item in corrected.estimates or [None]:
+                    rows.append([name, ", ".join(corrected.files), *numbers, *_estimate(item)])
         headings = "file", "corrected by", "minutes checked", "of minutes", "events corrected"
         return SheetTable([*headings, *_ESTIMATE], rows, "Checks")
 
