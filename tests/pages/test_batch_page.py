@@ -100,7 +100,7 @@ def test_columns_in_which_nothing_is_known_are_left_out(tmp_path: Path) -> None:
 
 def test_a_video_that_failed_is_named_with_its_error(tmp_path: Path) -> None:
     made = Elements(index(tmp_path, VIDEOS, c="in/c.mp4: cannot be read"))
-    assert "2 videos, 1 failed" in made.text
+    assert "3 videos, 1 failed" in made.text
     assert "Failed or doubtful\n\nc failed: in/c.mp4: cannot be read\n" in made.text
 
 
