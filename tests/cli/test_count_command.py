@@ -144,11 +144,14 @@ def test_the_workbook_of_a_run_has_a_frame(
     run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
 ) -> None:
     book = tmp_path / "red.xlsx"
-    wanted = ("--no-video", "--flows", book, "-c", folder / "lines.yaml")
-    run("detect-video", folder / "red.mp4", *red, *wanted, code=0)
+    detect = ("detect-video", folder / "red.mp4", *red, "--no-video", "-c", folder / "lines.yaml")
+    run(*detect, "--flows", book, code=0)
     sheets = openpyxl.load_workbook(book)
     (picture,) = sheets["Summary"]._images
     assert (picture.width, picture.height) == (320, 240)
+    run(*detect, "--flows", tmp_path / "coarse.xlsx", "--set", "output.coarse=true", code=0)
+    coarse = openpyxl.load_workbook(tmp_path / "coarse.xlsx")["Summary"]._images[0]
+    assert coarse._data() != picture._data(), "without faces and plates"
     assert [cell.value for cell in sheets["Flows"][2]][4:7] == ["gate", "yard", 1]
 
 

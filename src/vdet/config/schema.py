@@ -169,7 +169,7 @@ class InputSettings(Section):
 
 
 class OutputSettings(Section):
-    """The output video, in H.264, and the pictures of `--crops`, `--page` and `--review`."""
+    """The output video, in H.264, and the pictures of pages, workbooks and `--crops`."""
 
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow"] = (
         "superfast"

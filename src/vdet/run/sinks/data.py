@@ -23,9 +23,9 @@ from vdet.labels.formats import (
 )
 from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
-from vdet.media import Picture
 from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.result import FrameResult, findings_in
+from vdet.run.sinks.poster import Poster
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output
 from vdet.traffic.records import join_records, records_content
@@ -210,19 +210,17 @@ class WorkbookSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._image = survey_image(context.settings)
-        self._fullest: Picture | None = None
-        self._most = -1
+        self._poster = Poster(is_coarse=context.settings.output.coarse)
 
     def write(self, result: FrameResult) -> None:
         """Look for more vehicles."""
-        if self._image is None and len(result.tracks) > self._most:
-            self._fullest, self._most = result.frame.picture, len(result.tracks)
+        self._poster.add(result)
 
     def finish(self) -> None:
         """Write the file."""
         settings, counts = self.context.settings, self.traffic.counts()
-        image = self._fullest.image if self._fullest else self._image
         assert counts
+        image = self._poster.image(self.traffic.vehicles) if self._image is None else self._image
         assert image is not None  # a run has frames
         paths = {vehicle.id: vehicle.path for vehicle in self.traffic.vehicles}
         picture = scene_picture(image, settings.traffic, [counts], paths)

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-import cv2
-import numpy as np
-
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
 from vdet.config.rendering import render_settings
@@ -17,10 +14,9 @@ from vdet.draw.boxes import WHITE, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
-from vdet.media import Picture
 from vdet.media.cutting import copied_suffix, copy_part, encode_part
 from vdet.media.demux import is_pipe
-from vdet.media.images import coarse_scale, encode_image, is_image_name, shrunk
+from vdet.media.images import encode_image, is_image_name
 from vdet.media.writer import is_marked
 from vdet.pages.batch import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
@@ -29,6 +25,7 @@ from vdet.pages.video import Player, VideoPage
 from vdet.regions import Regions
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS, draw_tracks
+from vdet.run.sinks.poster import Poster
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.clock import Clock, Span, extend
 from vdet.traffic.live import LiveTraffic
@@ -143,8 +140,7 @@ class PageSink(BaseSink):
         self._crops = BestCrops(is_coarse=context.settings.output.coarse)
         self._thumbnails: dict[int, tuple[float, str]] = {}
         self._spans: list[Span] = []
-        self._fullest: Picture | None = None
-        self._most = 0
+        self._poster = Poster(is_coarse=context.settings.output.coarse)
         self._frames = 0
 
     def finish(self) -> None:
@@ -159,8 +155,7 @@ class PageSink(BaseSink):
         frame, picture = result.frame_tracks, result.frame.picture
         extend(self._spans, frame.time, _GAP)
         self._frames += 1
-        if self._fullest is None or len(frame.tracks) > self._most:
-            self._fullest, self._most = picture, len(frame.tracks)
+        self._poster.add(result)
         self._keep(self._crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:
@@ -176,7 +171,7 @@ class PageSink(BaseSink):
             spans=self._spans or [(start, start)],
             records=traffic.vehicles,
             thumbnails=self._thumbnails,
-            poster=self._poster(),
+            poster=self._poster.image(traffic.vehicles),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
             survey=Survey({self.video.path.name: counts}, settings) if counts else None,
@@ -187,17 +182,6 @@ class PageSink(BaseSink):
             clips=self._clips(),
             review=self._review(),
         )
-
-    def _poster(self) -> Image | None:
-        if not self._fullest:
-            return None
-        image, boxes = self._fullest.image, [record.largest for record in self.traffic.vehicles]
-        if not self.context.settings.output.coarse:
-            return image
-        height, width = image.shape[:2]
-        largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
-        reduced = shrunk(image, coarse_scale(largest, height))
-        return np.asarray(cv2.resize(reduced, (width, height)), np.uint8)  # marks are drawn on it
 
     def _review(self) -> str:
         """Return the address of the review of the counts, if this run writes one."""

@@ -1,0 +1,39 @@
+"""The frame that pages and workbooks show: the one with the most vehicles."""
+
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+
+from vdet.boxes import Image
+from vdet.media import Picture
+from vdet.media.images import coarse_scale, shrunk
+from vdet.run.result import FrameResult
+from vdet.traffic.records import VehicleRecord
+
+
+class Poster:
+    """Keeps the frame with the most vehicles; `is_coarse` is `output.coarse`."""
+
+    def __init__(self, *, is_coarse: bool) -> None:
+        self._is_coarse = is_coarse
+        self._picture: Picture | None = None
+        self._vehicles = 0
+
+    def add(self, result: FrameResult) -> None:
+        """Add a frame."""
+        if self._picture is None or len(result.tracks) > self._vehicles:
+            self._picture, self._vehicles = result.frame.picture, len(result.tracks)
+
+    def image(self, vehicles: Iterable[VehicleRecord]) -> Image | None:
+        """Return the frame, BGR uint8, at its own size; None without frames.
+
+        `vehicles` are all of the video: no detail is kept that would show their plates.
+        """
+        if self._picture is None or not self._is_coarse:
+            return self._picture and self._picture.image
+        image, boxes = self._picture.image, [vehicle.largest for vehicle in vehicles]
+        height, width = image.shape[:2]
+        largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
+        reduced = shrunk(image, coarse_scale(largest, height))
+        return np.asarray(cv2.resize(reduced, (width, height)), np.uint8)  # marks are drawn on it
