@@ -126,19 +126,20 @@ def test_a_vehicle_that_another_run_does_not_miss_is_not_added(tmp_path: Path) -
 
 def test_checked_minutes_of_a_sample_say_how_many_passed_in_all(tmp_path: Path) -> None:
     first = events_of(counts(), "line")[0]
-    cars = [replace(first, time=30 + 60.0 * n, id=n, vehicle=n) for n in range(10)]
-    video = replace(counts(), events=tuple(cars), spans=((0.0, 599.96),))
-    checked = [{"line": line, "start": 0, "end": 180} for line in ("line", "second")]
-    checked.append({"line": "line", "start": 240, "end": 300})
-    known = {"sample": {"seed": 1, "minutes": [2, 0, 1]}, "checked": checked}
-    path = saved(tmp_path / "c.yaml", missed(70), error(cars[5], "false"), **known)
+    cars = [replace(first, time=150 + 60.0 * n, id=n, vehicle=n) for n in range(10)]
+    video = replace(counts(), events=tuple(cars), spans=((121.5, 721.4),))
+    checked = [{"line": line, "start": 121.5, "end": 301.5} for line in ("line", "second")]
+    checked.append({"line": "line", "start": 361.5, "end": 421.5})
+    values = {"start": 1.5, "sample": {"seed": 1, "minutes": [4, 2, 3]}, "checked": checked}
+    path = saved(tmp_path / "c.yaml", missed(190), error(cars[5], "false"), **values)
     corrected = Corrections.read(path).apply(video).corrected
     assert corrected
     assert str(corrected) == "corrected: 2 events, by c.yaml; 3 of 10 minutes checked"
     errors = [CountError(minute=1, counted=None, true="bus")]
     true = estimate({"car": [1] * 10}, errors, checked=range(3), drawn=range(3))
     assert corrected.estimates == tuple(true)
-    unchecked = Corrections.read(saved(tmp_path / "c.yaml", missed(70))).apply(video).corrected
+    path = saved(tmp_path / "c.yaml", missed(190), start=1.5)
+    unchecked = Corrections.read(path).apply(video).corrected
     assert unchecked == Corrected(1, ("c.yaml",), checked=0, minutes=10)
 
 

@@ -159,6 +159,8 @@ class Corrections(Section):
     """Name of the video."""
     size: Size
     """Width and height of the frames that the points refer to."""
+    start: float = 0.0
+    """Time at which minute 0 begins: that of the first frame, seconds in the video."""
     lines: tuple[LineSettings, ...] = ()
     zones: tuple[ZoneSettings, ...] = ()
     reviewer: str | None = None
@@ -254,6 +256,10 @@ class Corrections(Section):
     def lines_checked_at(self, time: float) -> set[str]:
         """Return the lines and zones that were checked at this time, seconds in the video."""
         return {span.line for span in self.checked if span.start <= time < span.end}
+
+    def minute(self, time: float) -> int:
+        """Return the number of the minute of a time, seconds in the video."""
+        return int((time - self.start) // _MINUTE)
 
     @property
     def checked_lines(self) -> set[str]:
@@ -379,33 +385,27 @@ def _corrected(counts: Counts, review: Corrections, classes: dict[int, str]) -> 
                 )
     events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
     files = tuple(Path(name).name for name in review._files)
-    minutes, checked = _minutes(counts), _checked_minutes(counts, review)
+    minutes, checked = _minutes(counts, review), _checked_minutes(counts, review)
     estimates = _estimates(counts, review, pairs)
     corrected = Corrected(changes, files, len(checked), len(minutes), estimates)
     return replace(counts, events=tuple(events), corrected=corrected)
 
 
-def _minute(counts: Counts, time: float) -> int:
-    """Return the minute of a time in the video, from 0 at the first frame."""
-    return int((time - counts.spans[0][0]) // _MINUTE)
-
-
-def _minutes(counts: Counts) -> list[int]:
+def _minutes(counts: Counts, review: Corrections) -> list[int]:
     """Return the minutes with video."""
-    spans = ((_minute(counts, first), _minute(counts, last)) for first, last in counts.spans)
+    spans = ((review.minute(first), review.minute(last)) for first, last in counts.spans)
     minutes = {minute for first, last in spans for minute in range(first, last + 1)}
-    return sorted(minutes.union(_minute(counts, event.time) for event in counts.events))
+    return sorted(minutes.union(review.minute(event.time) for event in counts.events))
 
 
 def _checked_minutes(counts: Counts, review: Corrections) -> list[int]:
     """Return the minutes that were checked at all lines which were checked at any time."""
-    if not review.checked:
-        return []
-    times = {minute: counts.spans[0][0] + _MINUTE * minute for minute in _minutes(counts)}
+    lines = review.checked_lines
+    times = {minute: review.start + _MINUTE * minute for minute in _minutes(counts, review)}
     return [
         minute
         for minute, start in times.items()
-        if review.lines_checked_at(start + TOLERANCE) == review.checked_lines
+        if lines and review.lines_checked_at(start + TOLERANCE) == lines
     ]
 
 
@@ -415,13 +415,13 @@ def _estimates(
     pairs: Sequence[tuple[ReviewedEvent | None, Event | None]],
 ) -> tuple[Estimate, ...]:
     """Return the true number of events at the checked lines, as the page of the review does."""
-    numbers = {minute: number for number, minute in enumerate(_minutes(counts))}
+    numbers = {minute: number for number, minute in enumerate(_minutes(counts, review))}
     checked = _checked_minutes(counts, review)
     events = [event for event in counts.events if event.name in review.checked_lines]
     classes = {class_of(event) for event in events} or {UNKNOWN}
     counted = {name: [0] * len(numbers) for name in classes}
     for event in events:
-        counted[class_of(event)][numbers[_minute(counts, event.time)]] += 1
+        counted[class_of(event)][numbers[review.minute(event.time)]] += 1
     errors = [
         CountError(
             minute=numbers[minute],
@@ -429,7 +429,7 @@ def _estimates(
             true=None if reviewed.error == "false" else reviewed.true_class,
         )
         for reviewed, event in pairs
-        if reviewed and reviewed.error and (minute := _minute(counts, reviewed.time)) in checked
+        if reviewed and reviewed.error and (minute := review.minute(reviewed.time)) in checked
     ]
     sample = review.sample.minutes if review.sample else ()
     drawn = [numbers[minute] for minute in sample if minute in numbers]

@@ -338,7 +338,7 @@ function corrections() {
     complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
   const events = allMarks().filter(isListed).sort((a, b) => a.seconds - b.seconds).flatMap(eventLines);
   const sample = state.sample ? `{seed: ${state.sample.seed}, minutes: [${state.sample.minutes.join(", ")}]}` : "null";
-  return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, ...list("lines", lines), ...list("zones", zones),
+  return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, `start: ${data.start}`, ...list("lines", lines), ...list("zones", zones),
     `reviewer: ${state.reviewer ? quoted(state.reviewer) : "null"}`, `saved: ${now()}`, `sample: ${sample}`,
     ...list("checked", checked), ...list("events", events), ""].join("\n");
 }

@@ -30,9 +30,11 @@ class Poster:
 
         `vehicles` are all of the video: no detail is kept that would show their plates.
         """
-        if self._picture is None or not self._is_coarse:
-            return self._picture and self._picture.image
+        if self._picture is None:
+            return None
         image, boxes = self._picture.image, [vehicle.largest for vehicle in vehicles]
+        if not self._is_coarse:
+            return image
         height, width = image.shape[:2]
         largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
         reduced = shrunk(image, coarse_scale(largest, height))
