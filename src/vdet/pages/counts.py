@@ -50,12 +50,10 @@ def _plot(counts: list[Counts], length: int) -> Plot | None:
         for event in (event for event in video.events if event.name in names):
             start = intervals.number(index, event.time) - first.number
             series[f"{event.name}: {event.direction}"][start] += 1
+    if not any(series.values()):
+        return None
     zero = None
     if isinstance(first.start, datetime):
         zero = 3600.0 * first.start.hour + 60 * first.start.minute + first.start.second
     x = time_axis(0, last.number + length - first.number, zero)
-    return (
-        interval_plot(series, x, length, "Vehicles by interval", zero)
-        if any(series.values())
-        else None
-    )
+    return interval_plot(series, x, length, "Vehicles by interval", zero)

@@ -400,12 +400,11 @@ def _minutes(counts: Counts, review: Corrections) -> list[int]:
 
 def _checked_minutes(counts: Counts, review: Corrections) -> list[int]:
     """Return the minutes that were checked at all lines which were checked at any time."""
-    lines = review.checked_lines
-    times = {minute: review.start + _MINUTE * minute for minute in _minutes(counts, review)}
+    lines, start = review.checked_lines, review.start + TOLERANCE
     return [
         minute
-        for minute, start in times.items()
-        if lines and review.lines_checked_at(start + TOLERANCE) == lines
+        for minute in _minutes(counts, review)
+        if lines and review.lines_checked_at(start + _MINUTE * minute) == lines
     ]
 
 
