@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.count_estimate import CountError, Estimate, estimate
+from vdet.traffic.estimate import CountError, Estimate, estimate
 from vdet.traffic.sample import draw_minutes
 
 CLASSES = {"car": 0.85, "truck": 0.1, "bus": 0.05}

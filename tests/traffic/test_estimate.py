@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.count_estimate import CountError, Estimate, _gamma, _student, estimate
 from benchmarks.estimates import SITUATIONS, measure
 from scipy import stats
 
 from browser import browser
 from vdet.pages.render import TEMPLATES
+from vdet.traffic.estimate import CountError, Estimate, _gamma, _student, estimate
 from vdet.traffic.sample import draw_minutes, strata_of
 
 TRAFFIC = [0] * 20 + [4, 5, 6, 5] * 10 + [20, 30, 25, 40] * 5

@@ -1,6 +1,6 @@
-"""The estimate of `estimate.js` in Python, for simulations; see there for the method.
+"""How right a count is: the true count, estimated by the minutes that were checked.
 
-`tests/traffic/test_estimate.py` compares their numbers.
+The page of a review computes the same in `estimate.js`, which explains the method and its sources.
 """
 
 from bisect import bisect_left
