@@ -4,6 +4,7 @@ import json
 import random
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -176,36 +177,63 @@ def test_zones_regions_and_points_are_drawn_by_keys_and_undone(
     assert "zones" not in window.text("#text")
 
 
-def test_two_known_lengths_along_a_lane_are_enough_for_the_ground(
-    window: Browser, tmp_path: Path
+@pytest.mark.parametrize("is_width", [False, True])
+def test_two_known_lengths_along_a_lane_or_its_width_are_enough_for_the_ground(
+    window: Browser, tmp_path: Path, is_width: bool
 ) -> None:
     # A level camera 8 m above the road, tilted by 12 degrees; the lane runs 6 degrees to the right.
-    tilt, turn, focal = np.radians(12), np.radians(6), 1600.0
+    tilt, turn, focal = np.radians(12), np.radians(6), 1280.0 if is_width else 1600.0
 
-    def seen(along: float) -> tuple[float, float]:
-        x, z = 1.5 + along * np.sin(turn), along * np.cos(turn)
+    def seen(along: float, across: float = 0) -> tuple[float, float]:
+        x = 1.5 + along * np.sin(turn) + across * np.cos(turn)
+        z = along * np.cos(turn) - across * np.sin(turn)
         depth = z * np.cos(tilt) + 8 * np.sin(tilt)
         down = 8 * np.cos(tilt) - z * np.sin(tilt)
         return 640 + focal * x / depth, 360 + focal * down / depth
 
     window.open(written(tmp_path, drawing(list(frames(*DOWN)))))
     window.type("g")
-    for along in (22, 25, 46, 55):
-        window.click(seen(along))
-    window.run(
-        "get('length-1').value = arguments[0]; get('length-3').value = arguments[1];"
-        "get('lengths').click()",
-        *(3, 9),
-    )
+    lane = [(22, 0), (46, 0), (22, 3.5), (46, 3.5)]
+    for point in lane if is_width else [(22,), (25,), (46,), (55,)]:
+        window.click(seen(*point))
+    for name, value in (
+        {"lane-width": 3.5}.items() if is_width else {"length-1": 3, "length-3": 9}.items()
+    ):
+        window.run("get(arguments[0]).value = arguments[1]", name, value)
+    window.run("get('lengths').click()")
     values = parse_document(window.text("#text"), "text").values["camera"]["ground"]
     ground = fit_ground(
         np.array([value["pixel"] for value in values]) + 0.5,
         np.array([value["metres"] for value in values]),
         Undistorter(None, 1280, 720),
     )
-    lane = ground.metres(np.array([seen(along) for along in (20.0, 30.0, 40.0, 50.0, 60.0)]))
-    steps = np.hypot(*np.diff(lane, axis=0).T)
+    assert "cars are" not in window.text("#warnings")
+    middle = ground.metres(np.array([seen(along) for along in (20.0, 30.0, 40.0, 50.0, 60.0)]))
+    steps = np.hypot(*np.diff(middle, axis=0).T)
     assert steps == pytest.approx([10, 10, 10, 10], rel=0.02)
+
+
+def test_metres_by_which_cars_are_far_too_wide_have_a_warning(
+    window: Browser, tmp_path: Path
+) -> None:
+    video = frames(*DOWN)
+    cars = [
+        replace(frame, tracks=tuple(replace(track, class_name="car") for track in frame.tracks))
+        for frame in video
+    ]
+    window.open(written(tmp_path, drawing(cars)))
+    window.type("g")
+    for point in ((300, 700), (500, 300), (1000, 700), (800, 300)):
+        window.click(point)
+    for width in (8, 100):
+        window.run(
+            "document.querySelector('#list .row').click();"
+            "get('lane-width').value = arguments[0]; get('lengths').click()",
+            width,
+        )
+        warning = window.text("#warnings")
+        assert bool(warning) == (width == 100)
+    assert warning == "ground: cars are 19.7 m wide by these points; check their metres"
 
 
 def test_a_finger_draws_on_a_small_screen(tmp_path: Path) -> None:

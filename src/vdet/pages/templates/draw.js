@@ -219,6 +219,7 @@ function inRegions(paths, regions, [width, height]) {
 // ---------------------------------------------------------------- what follows from crossings
 const NEAR = 0.5; // heights of the box within which a path that begins or ends is at a line
 const FEW = 0.05; // fraction of the crossings up to which there is no warning
+const CARS = 5, WIDTHS = [0.8, 5]; // number of cars for a median of their widths, and the widths that are possible, metres
 
 /** Return the sentences of a run about a line; visits are [path, its crossings]. */
 function warningsOf(line, visits, paths, span) {
@@ -235,6 +236,18 @@ function warningsOf(line, visits, paths, span) {
     again > few && `paths that cross this line more than once: ${again}; place it across the road`,
     heights.length && line.length < quantile(heights, 0.5) && "this line is shorter than a vehicle; make it longer",
   ].filter(text => text);
+}
+
+/** Return a warning if cars cannot have the widths that the ground gives them: their boxes are 1.25 times as wide as high. */
+function groundWarnings(ground, paths) {
+  const widths = paths.filter(path => path.kind === "car").flatMap(path => {
+    const row = path.seen >> 1, half = path.heights[row] / 1.6;
+    const [left, right] = [-half, half].map(aside => ground?.toMetres([path.xs[row] + aside, path.ys[row]]));
+    return left && right ? [Math.hypot(right[0] - left[0], right[1] - left[1])] : [];
+  });
+  if (widths.length < CARS) return [];
+  const width = quantile(widths, 0.5);
+  return width < WIDTHS[0] || width > WIDTHS[1] ? [`ground: cars are ${width.toFixed(1)} m wide by these points; check their metres`] : [];
 }
 
 function quantile(values, fraction) {
@@ -303,6 +316,20 @@ function fitGround(points) {
   const pixels = points.map(each => each.pixel), metres = points.map(each => each.metres);
   const [toMetres, toPixels] = points.length < 4 ? [] : [homography(pixels, metres), homography(metres, pixels)];
   return toMetres && toPixels ? { toMetres, toPixels } : null;
+}
+
+/** Return points of the plane from the width of a straight lane: two points on its left line, and two on its right, near
+ * and far; null where they do not fit. The camera is level, and its focal length is the frame's width. */
+function groundOfLane(pixels, laneWidth, size) {
+  const [[x1, y1], [x2, y2], [x3, y3], [x4, y4]] = pixels, a = x1 * y2 - y1 * x2, b = x3 * y4 - y3 * x4;
+  const parallel = (x1 - x2) * (y3 - y4) - (y1 - y2) * (x3 - x4);
+  const [vanishing, horizon] = [a * (x3 - x4) - (x1 - x2) * b, a * (y3 - y4) - (y1 - y2) * b].map(value => value / parallel);
+  if (!(laneWidth > 0 && y1 > y2 && y3 > y4 && horizon < Math.min(y2, y4))) return null;
+  const middle = size[0] / 2, focal = Math.hypot(size[0], horizon - size[1] / 2), slope = (vanishing - middle) / focal;
+  const place = ([x, y]) => [(x - middle) / focal, 1].map(value => value / (y - horizon));
+  const [left, right] = [pixels[0], pixels[2]].map(place).map(([across, along]) => across - slope * along);
+  const scale = laneWidth * Math.hypot(1, slope) / Math.abs(right - left);
+  return pixels.map(pixel => ({ pixel, metres: place(pixel).map(value => value * scale) }));
 }
 
 /** Return points of the plane from two lengths along a straight lane, each from near to far; null where they do not
@@ -660,13 +687,17 @@ async function openPage(data) {
   /** Return fields that replace four points by a plane in metres. */
   function fieldsOfLengths(button) {
     const inputs = [1, 3].map(first => el("input", { type: "number", step: "any", id: `length-${first}` }));
+    const laneWidth = el("input", { type: "number", step: "any", id: "lane-width" });
     const set = () => {
-      const made = levelGround(places.ground.map(each => each.pixel), inputs.map(input => Number(input.value)), size);
+      const pixels = places.ground.map(each => each.pixel), lengths = inputs.map(input => Number(input.value));
+      const made = laneWidth.value ? groundOfLane(pixels, Number(laneWidth.value), size) : levelGround(pixels, lengths, size);
       if (made) change(() => { [places.ground, selected] = [made, null]; });
       else say("These lengths do not fit the points: points 1 and 2, then 3 and 4, must go from near to far.");
     };
     return [el("p", {}, "Ends of two known lengths along one straight lane, from near to far. The camera is assumed to be level."),
-      ...inputs.map((input, i) => el("label", {}, `Points ${2 * i + 1} to ${2 * i + 2}, m`, input)), button("Set the metres", set, "lengths")];
+      ...inputs.map((input, i) => el("label", {}, `Points ${2 * i + 1} to ${2 * i + 2}, m`, input)),
+      el("p", {}, "Or the width of a lane: points 1 and 2 on its left line, 3 and 4 on its right line, from near to far."),
+      el("label", {}, "Width of the lane, m", laneWidth), button("Set the metres", set, "lengths")];
   }
 
   function showList() {
@@ -689,6 +720,7 @@ async function openPage(data) {
     const lines = found.slice(0, places.lines.length), problems = problemsOf(places, size);
     const warnings = lines.flatMap(({ border, visits }) =>
       warningsOf(border, visits, paths, data.span).map(text => `${border.name}: ${text}`));
+    warnings.push(...groundWarnings(fitGround(places.ground), paths));
     get("warnings").replaceChildren(...[...problems, ...warnings].map((text, i) =>
       el("li", { class: i < problems.length ? "problem" : "" }, text)));
     get("save").disabled = problems.length > 0;
