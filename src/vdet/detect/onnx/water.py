@@ -13,7 +13,7 @@ _AREAS, _MAX_SIDE = (3, 30), 9
 """Minimum and maximum area of a drop, and the maximum side of its bounding box, pixels."""
 _FILLED = 0.35
 """Minimum fraction of its bounding box that a drop fills."""
-_SHARPNESS = 0.17
+_SHARPNESS = 0.2
 """Minimum fine contrast per gradient: the road behind wet glass is blurred."""
 _IN_DROPS = 0.07
 """Minimum of that ratio times the fraction of the fine contrast that is in drops."""
@@ -30,7 +30,7 @@ def without_drops(image: Image) -> Image | None:
     """
     height, width = image.shape[:2]
     size = WIDTH, max(1, round(height * WIDTH / width))
-    green = cv2.resize(image[:, :, 1], size, interpolation=cv2.INTER_AREA)
+    green = cv2.resize(cv2.extractChannel(image, 1), size, interpolation=cv2.INTER_AREA)
     if not is_wet(np.asarray(green, np.uint8)):
         return None
     return np.asarray(cv2.medianBlur(image, round(_MEDIAN * width) | 1), np.uint8)
@@ -49,7 +49,9 @@ def is_wet(plane: Image) -> bool:
     sharpness = fine.mean() / (gradient + 1)
     if sharpness < _SHARPNESS:
         return False
-    spots = cv2.threshold(fine, _DIFFERENCE, 1, cv2.THRESH_BINARY)[1]
+    spots = cv2.threshold(fine, _DIFFERENCE, 255, cv2.THRESH_BINARY)[1]
+    if (cv2.resize(spots, _TILES, interpolation=cv2.INTER_AREA) > 0).mean() <= _COVERED:
+        return False  # the same condition as below, for all spots: it is quick
     _, _, stats, centers = cv2.connectedComponentsWithStats(spots)
     widths, heights, areas = stats[1:, 2], stats[1:, 3], stats[1:, 4]
     is_drop = (areas >= _AREAS[0]) & (areas <= _AREAS[1]) & (areas >= _FILLED * widths * heights)
