@@ -54,8 +54,8 @@ def images(
     sets = [read_labelled_images(path, roles) for path in data]
     images_read = (image.path for labelled in sets for image in labelled.images)
     results.check(source.inputs(*data, *images_read, settings=settings))
-    minimum = settings.detector
-    counting = Counting(minimum.min_score_still, min_width, minimum.min_scores_still)
+    shown = settings.detector
+    counting = Counting(shown.min_score_still, min_width, shown.class_minima)
     with progress_steps(" images") as steps:
         score = evaluate_images(sets, detector, counting, threads=core_count(), steps=steps)
     results.print_report(images_report(score, _run_name(settings, source)))

@@ -1,6 +1,7 @@
 """The section `detector`: of networks, and of the linear SVM with its features and windows."""
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -26,13 +27,16 @@ class DetectorSettings(Section):
     """Search every N-th frame. Overrides searches_per_second."""
     min_score_still: Ratio = 0.0
     """Minimum score of a vehicle in a single image. In video, the tracker decides."""
-    min_scores_still: dict[str, Ratio] = Field({}, max_length=100)
-    """Minimum scores of single classes in an image, instead of min_score_still."""
 
     @property
     def vehicle_classes(self) -> tuple[str, ...]:
         """The classes that the detector looks for, of `vdet.config.classes.OUR_NAMES`."""
         return "car", "truck", "bus", "vehicle"
+
+    @property
+    def class_minima(self) -> Mapping[str, float]:
+        """The minimum scores of classes for which it is not `min_score_still`."""
+        return {}
 
     @property
     def tyre_height(self) -> float:
@@ -41,7 +45,7 @@ class DetectorSettings(Section):
 
     def showing_all(self) -> Self:
         """Return settings with which a single image shows detections of every score."""
-        return self.model_copy(update={"min_score_still": 0.0, "min_scores_still": {}})
+        return self.model_copy(update={"min_score_still": 0.0})
 
 
 class NetworkSettings(DetectorSettings):
@@ -57,6 +61,7 @@ class NetworkSettings(DetectorSettings):
     min_scores_still: dict[str, Ratio] = Field(
         {"truck": 0.55, "bus": 0.55, "bicycle": 0.3, "person": 0.2}, max_length=100
     )
+    """Minimum scores of single classes in an image, instead of min_score_still."""
     min_score: float = Field(0.03, gt=0, lt=1)
     """Ignore boxes with a lower score. Of the others, a video shows what reaches tracker.min_score,
     and an image what reaches min_score_still.
@@ -76,6 +81,15 @@ class NetworkSettings(DetectorSettings):
     def vehicle_classes(self) -> tuple[str, ...]:
         """The classes that the detector looks for."""
         return self.classes
+
+    @property
+    def class_minima(self) -> Mapping[str, float]:
+        """The minimum scores of classes for which it is not `min_score_still`."""
+        return self.min_scores_still
+
+    def showing_all(self) -> Self:
+        """Return settings with which a single image shows detections of every score."""
+        return super().showing_all().model_copy(update={"min_scores_still": {}})
 
 
 class HogSettings(Section):

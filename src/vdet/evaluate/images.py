@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields
 from functools import cached_property
+from itertools import compress
 from statistics import fmean
 from typing import Any, Self
 
@@ -41,10 +42,6 @@ class Counting:
     min_width: float
     scores: Mapping[str, float] = field(default_factory=dict)
 
-    def minimum(self, class_name: str | None) -> float:
-        """Return the minimum score of a class."""
-        return self.scores.get(class_name or "", self.score)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredImage:
@@ -76,7 +73,7 @@ class MeasuredImage:
             for number, box in enumerate(boxes)
         ]
         detected = [label._replace(ignored=_width(label) < minimum) for label in detected]
-        shown = [label for label in detected if label.score >= counting.minimum(label.name)]
+        shown = list(compress(detected, boxes.reach(counting.score, counting.scores)))
         every, counted = (compare_frames({1: labels}, {1: truth}) for labels in (detected, shown))
         return cls(image, every, counted)
 

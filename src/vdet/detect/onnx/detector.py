@@ -144,7 +144,7 @@ class NetworkDetector:
         assert boxes.classes is not None
         rows = (boxes.scores >= settings.min_score) & (boxes.classes < len(names))
         if candidates.is_still:
-            rows &= boxes.reach(settings.min_score_still, settings.min_scores_still)
+            rows &= boxes.reach(settings.min_score_still, settings.class_minima)
             large = np.flatnonzero(rows & _have_four_wheels(boxes.classes, names))
             nested = are_nested(boxes.sides[large], boxes.scores[large])
             rows[large[nested]] = False  # a lorry and its body

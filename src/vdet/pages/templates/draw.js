@@ -318,36 +318,45 @@ function fitGround(points) {
   return toMetres && toPixels ? { toMetres, toPixels } : null;
 }
 
+/** Return the plane below a level camera whose focal length is the frame's width, in any unit: where a pixel lies, and how
+ * far aside a straight line goes for each unit along, by the x of its vanishing point. */
+function levelPlane(horizon, size) {
+  const middle = size[0] / 2, focal = Math.hypot(size[0], horizon - size[1] / 2);
+  return {
+    place: ([x, y]) => [(x - middle) / focal, 1].map(value => value / (y - horizon)),
+    slopeOf: vanishing => (vanishing - middle) / focal,
+  };
+}
+
+/** Return points of the plane in metres: `scale` is the number of metres of a unit. */
+const scaledGround = (pixels, place, scale) => pixels.map(pixel => ({ pixel, metres: place(pixel).map(value => value * scale) }));
+
 /** Return points of the plane from the width of a straight lane: two points on its left line, and two on its right, near
- * and far; null where they do not fit. The camera is level, and its focal length is the frame's width. */
+ * and far; null where they do not fit. */
 function groundOfLane(pixels, laneWidth, size) {
   const [[x1, y1], [x2, y2], [x3, y3], [x4, y4]] = pixels, a = x1 * y2 - y1 * x2, b = x3 * y4 - y3 * x4;
   const parallel = (x1 - x2) * (y3 - y4) - (y1 - y2) * (x3 - x4);
   const [vanishing, horizon] = [a * (x3 - x4) - (x1 - x2) * b, a * (y3 - y4) - (y1 - y2) * b].map(value => value / parallel);
   if (!(laneWidth > 0 && y1 > y2 && y3 > y4 && horizon < Math.min(y2, y4))) return null;
-  const middle = size[0] / 2, focal = Math.hypot(size[0], horizon - size[1] / 2), slope = (vanishing - middle) / focal;
-  const place = ([x, y]) => [(x - middle) / focal, 1].map(value => value / (y - horizon));
+  const { place, slopeOf } = levelPlane(horizon, size), slope = slopeOf(vanishing);
   const [left, right] = [pixels[0], pixels[2]].map(place).map(([across, along]) => across - slope * along);
-  const scale = laneWidth * Math.hypot(1, slope) / Math.abs(right - left);
-  return pixels.map(pixel => ({ pixel, metres: place(pixel).map(value => value * scale) }));
+  return scaledGround(pixels, place, laneWidth * Math.hypot(1, slope) / Math.abs(right - left));
 }
 
 /** Return points of the plane from two lengths along a straight lane, each from near to far; null where they do not
- * fit. The camera is level; its focal length is the frame's width: lengths along the lane do not depend on it. */
+ * fit. The lengths do not depend on the focal length. */
 function levelGround(pixels, lengths, size) {
   const [y1, y2, y3, y4] = pixels.map(pixel => pixel[1]);
   const ratio = lengths[0] * (y3 - y4) / (lengths[1] * (y1 - y2)); // (y3 - h)(y4 - h) / (y1 - h)(y2 - h), h the horizon
   const [a, b, c] = [1 - ratio, ratio * (y1 + y2) - y3 - y4, y3 * y4 - ratio * y1 * y2];
   const horizon = (-b - Math.sqrt(b * b - 4 * a * c)) / (2 * a);
   if (!(y1 > y2 && y2 >= y3 && y3 > y4 && ratio > 0 && horizon < y4)) return null;
-  const [near, , , far] = pixels, middle = size[0] / 2;
-  const vanishing = near[0] + (far[0] - near[0]) * (horizon - near[1]) / (far[1] - near[1]);
-  const focal = Math.hypot(size[0], horizon - size[1] / 2), turn = Math.atan2(vanishing - middle, focal);
-  const scale = Math.cos(turn) * lengths[0] / (1 / (y2 - horizon) - 1 / (y1 - horizon));
-  const place = ([x, y]) => [(x - middle) / focal, 1].map(value => value * scale / (y - horizon));
-  const aside = (near[0] < middle ? size[0] : -size[0]) / 4 / (y1 - horizon);
+  const [near, , , far] = pixels, { place, slopeOf } = levelPlane(horizon, size);
+  const slope = slopeOf(near[0] + (far[0] - near[0]) * (horizon - near[1]) / (far[1] - near[1]));
+  const scale = lengths[0] / Math.hypot(1, slope) / (1 / (y2 - horizon) - 1 / (y1 - horizon));
+  const aside = (near[0] < size[0] / 2 ? size[0] : -size[0]) / 4 / (y1 - horizon);
   const corners = [near, far].flatMap(([x, y]) => [[x, y], [x + aside * (y - horizon), y]]);
-  return corners.map(pixel => ({ pixel, metres: place(pixel) }));
+  return scaledGround(corners, place, scale);
 }
 
 // ---------------------------------------------------------------- the file
