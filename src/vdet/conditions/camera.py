@@ -41,7 +41,7 @@ class CameraWatch:
         """Displacements of the corners of the frame since the start, `(4, 2)` each, fractions of
         the width: infinite in another view, NaN if unknown.
         """
-        self._stood: list[bool] = []
+        self._still_planes = 0
         self._plane: Image | None = None
         self._points = np.empty((0, 1, 2), np.float32)
         self._reference = np.zeros((4, 2))
@@ -58,7 +58,8 @@ class CameraWatch:
         position = self._reference + moved / plane.shape[1]
         before = self._positions[-1] if self._positions else position
         with np.errstate(invalid="ignore"):  # both may be other views
-            self._stood.append(bool(np.abs(position - before).max() <= _LIMIT / 2))
+            stood = bool(np.abs(position - before).max() <= _LIMIT / 2)
+        self._still_planes += stood
         self._times.append(time)
         self._positions.append(position)
         is_old = time - self._since > _RENEWED and np.isfinite(position).all()
@@ -66,12 +67,17 @@ class CameraWatch:
             if np.abs(moved).max() > _ERROR:  # so that small errors do not add up
                 self._reference = position
             self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
-        return self._stood[-1]
+        return stood
 
     @property
     def is_still(self) -> bool:
         """Whether the camera was fixed most of the time."""
-        return len(self._stood) > 1 and float(np.mean(self._stood)) >= _STILL
+        return len(self._times) > 1 and not self.moves
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is known not to be fixed."""
+        return self._still_planes < _STILL * len(self._times)
 
     def findings(self) -> list[Finding]:
         """Return when the camera moved, or when it was moved permanently."""

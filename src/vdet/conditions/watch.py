@@ -1,6 +1,7 @@
 """Watches the conditions of one video: small planes of its frames, and their detections."""
 
 from collections.abc import Sequence
+from dataclasses import astuple
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ from vdet.conditions import visibility
 from vdet.conditions.camera import CameraWatch
 from vdet.conditions.finding import Finding, Findings
 from vdet.conditions.motion import MotionWatch
+from vdet.conditions.weak import WeakWatch
 from vdet.config.schema import Settings
 from vdet.detect.onnx.water import is_wet
 from vdet.media import Picture
@@ -35,7 +37,7 @@ class Conditions:
     def __init__(self, settings: Settings, width: int) -> None:
         self._settings = settings
         self._width = width
-        self._camera, self._motion = CameraWatch(), MotionWatch()
+        self._camera, self._motion, self._weak = CameraWatch(), MotionWatch(), WeakWatch()
         self._times: list[float] = []
         self._measures: list[Float64Array] = []
         self._wet: list[bool] = []
@@ -55,6 +57,13 @@ class Conditions:
         is_clear = not visibility.reasons(self._measures[-1][np.newaxis], self._wet[-1])[0]
         stood = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
         self._motion.add(time, plane, boxes, stood=stood)
+        shown = np.array([astuple(track.box) for track in tracks]).reshape(-1, 4)
+        self._weak.add(time, picture, detections, shown)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the camera is known to move, so far."""
+        return self._camera.moves
 
     def findings(self) -> Findings:
         """Return the findings so far, except those that the settings suppress."""
@@ -69,8 +78,8 @@ class Conditions:
             times, measures = np.array(self._times), np.array(self._measures)
             if settings.traffic or settings.regions or settings.camera.ground:
                 findings += self._camera.findings()
-            if self._camera.is_still:
-                findings += self._motion.findings()
+            watch = self._motion if self._camera.is_still else self._weak
+            findings += watch.findings()
             is_shipped = detector.kind == "net" and detector.model is None
             wet = np.array(self._wet)
             findings += visibility.findings(times, measures, wet, is_shipped=is_shipped)

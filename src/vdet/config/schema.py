@@ -61,7 +61,7 @@ class LaneSettings(Shape):
 
 Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
-    "lane-geometry", "small-frames", "traces",
+    "lane-geometry", "small-frames", "traces", "uncertain",
 ]  # fmt: skip
 """What makes a result doubtful; docs/conditions.md explains each."""
 
