@@ -4,6 +4,7 @@ A step is made for one video or one image. An entry point of the group `vdet.ste
 that takes a `StepContext` and returns a step, or None if the settings do not enable it.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
@@ -12,6 +13,7 @@ from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
+from vdet.polygons import Point
 from vdet.regions import Regions
 from vdet.run.result import CONDITIONS, Facts, FrameResult
 from vdet.track.track import Track
@@ -19,6 +21,12 @@ from vdet.track.track import Track
 if TYPE_CHECKING:  # what an image does not need is loaded where it is used
     from vdet.conditions.watch import Conditions
     from vdet.lanes.road import Road, RoadFinder
+
+_MOVED = 0.2
+"""Minimum distance from its start of a vehicle that moves, in its sizes; jitter is a tenth of that.
+"""
+_MIN_STANDING_SCORE = 0.6
+"""Minimum score of a vehicle that has not moved."""
 
 
 class Step(Protocol):
@@ -80,7 +88,8 @@ def make_steps(context: StepContext) -> list[Step]:
     if context.video is not None:
         from vdet.conditions.watch import Conditions
 
-        steps.append(ConditionStep(Conditions(settings, width)))
+        conditions = Conditions(settings, width)
+        steps += [ConditionStep(conditions), StandingStep(conditions)]
     if settings.lanes.enabled:
         from vdet.lanes.road import RoadFinder
 
@@ -91,6 +100,49 @@ def make_steps(context: StepContext) -> list[Step]:
         steps.append(RegionStep(Regions(settings.regions, width, height)))
     steps += [load_plugin(STEPS, name)(context) for name in settings.steps]
     return [step for step in steps if step is not None]
+
+
+class ConditionStep:
+    """Watches for reasons to doubt the results, without changing them."""
+
+    def __init__(self, conditions: "Conditions") -> None:
+        self._conditions = conditions
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Analyse a searched frame."""
+        if result.searched:
+            time, picture = float(result.frame.time), result.frame.picture
+            self._conditions.add(time, picture, result.detections, result.tracks)
+        return result
+
+    def finish(self) -> Facts:
+        """Return the findings about the video."""
+        return {CONDITIONS: self._conditions.findings()}
+
+
+class StandingStep:
+    """Hides what has not moved before a fixed camera, and scores low: usually a sign or a building.
+
+    It is shown from when it moves, or scores high.
+    """
+
+    def __init__(self, conditions: "Conditions") -> None:
+        self._conditions = conditions
+        self._starts: dict[int, Point] = {}
+        self._shown: set[int] = set()
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Keep the vehicles that moved or score high; all, if the camera moves."""
+        for track in result.tracks:
+            start = self._starts.setdefault(track.id, track.foot)
+            size = (track.box.width + track.box.height) / 2
+            moved = math.dist(start, track.foot) >= _MOVED * size
+            if moved or track.score >= _MIN_STANDING_SCORE:
+                self._shown.add(track.id)
+        if self._conditions.moves:
+            return result
+        tracks = tuple(track for track in result.tracks if track.id in self._shown)
+        return replace(result, tracks=tracks)
 
 
 class LaneStep:
@@ -148,21 +200,3 @@ class RegionStep:
 def tracks_inside(regions: Regions, tracks: Sequence[Track]) -> tuple[Track, ...]:
     """Return the vehicles whose foot is inside the regions."""
     return tuple(track for track in tracks if regions.contains(track.foot))
-
-
-class ConditionStep:
-    """Watches for reasons to doubt the results, without changing them."""
-
-    def __init__(self, conditions: "Conditions") -> None:
-        self._conditions = conditions
-
-    def apply(self, result: FrameResult) -> FrameResult:
-        """Analyse a searched frame."""
-        if result.searched:
-            time, picture = float(result.frame.time), result.frame.picture
-            self._conditions.add(time, picture, result.detections, result.tracks)
-        return result
-
-    def finish(self) -> Facts:
-        """Return the findings about the video."""
-        return {CONDITIONS: self._conditions.findings()}

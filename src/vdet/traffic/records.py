@@ -28,8 +28,6 @@ Shorter movements are jitter of the boxes.
 
 _STANDING = 60.0
 """Seconds after which a vehicle that has not moved is standing."""
-_MIN_STILL_SCORE = 0.6
-"""Minimum mean score of a vehicle that never moved, where none drove; others are false alarms."""
 
 Motion = Literal["drove", "standing", "unknown"]
 """Whether a vehicle moved, as seen by a still camera; "unknown": it did not, but was shown for less
@@ -190,25 +188,15 @@ class VehicleRecords:
     ) -> tuple[VehicleRecord, ...]:
         """Return the records by id, with the speeds of a meter; call it once, at the end.
 
-        If the camera `is_still`, they have a `motion`, and probable false alarms are omitted: those
-        that never moved, where nothing drove, with a low mean score.
+        If the camera `is_still`, they have a `motion`.
         """
         self._show()
         for number, speeds in (meter.speeds() if meter else {}).items():
             self._vehicles[number].speeds = speeds
         records = [record for _, record in sorted(self._vehicles.items())]
-        if not is_still:
-            return tuple(records)
-        for record in records:
+        for record in records if is_still else ():
             record.judge()
-        driven = [point for record in records if record.has_driven for point in record.path]
-        return tuple(
-            record
-            for record in records
-            if record.has_driven
-            or record.mean_score >= _MIN_STILL_SCORE
-            or any(map(record.largest.contains, driven))
-        )
+        return tuple(records)
 
     def _show(self) -> None:
         for track in self._latest.tracks if self._latest else ():
