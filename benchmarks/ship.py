@@ -13,6 +13,7 @@ from typing import Any
 import onnx
 
 from benchmarks.unseen import OURS
+from vdet.config.classes import our_name
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
@@ -65,7 +66,12 @@ def ship(weights: Path, results: Path | None, output: Path) -> Header:
         found = values.get(OURS) or values.get(str(weights), {})
         if "calibration" not in found:
             raise DataError(f"{results}: has no calibration for {weights}")
-        calibrated = {name: found[name] for name in ("calibration", "by_class")}
+        by_class = {
+            name: found["by_class"][our_name(name) or name]
+            for name in header.classes
+            if (our_name(name) or name) in found["by_class"]
+        }
+        calibrated = {"calibration": found["calibration"], "by_class": by_class}
         header = Header.model_validate(header.model_dump() | calibrated)
     write_model(onnx.load(str(source)), header, output, overwrite=True)
     return header
