@@ -1,6 +1,7 @@
 """From the weights of a training to the shipped network: `make ship WEIGHTS=net.onnx`.
 
-The weights are those of `vdet train-net`, a network or a checkpoint, also of earlier code. The
+The weights are those of `vdet train-net`, a network or a checkpoint, also of earlier code; with
+`--base`, the mean of these and of the network from which the training started. The
 calibration of its scores comes from the results of `make unseen`: that of the networks that were
 trained without what they were measured on, or, where these are not there, that of the same network.
 """
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import onnx
+from onnx import numpy_helper
 
 from benchmarks.unseen import OURS
 from vdet.config.classes import our_name
@@ -45,14 +47,38 @@ def from_checkpoint(path: Path, output: Path) -> None:
     export_network(network, header, output, overwrite=True)
 
 
-def ship(weights: Path, results: Path | None, output: Path) -> Header:
+def mix(model: onnx.ModelProto, base: onnx.ModelProto) -> None:
+    """Average the weights of a network with those of its base, which may lack the last classes.
+
+    Source: Wortsman et al., "Robust fine-tuning of zero-shot models", 2022.
+    """
+    for new, old in zip(_weights(model), _weights(base), strict=True):
+        values, before = numpy_helper.to_array(new).copy(), numpy_helper.to_array(old)
+        values[: len(before)] = (values[: len(before)] + before) / 2
+        new.CopyFrom(numpy_helper.from_array(values, new.name))
+
+
+def _weights(model: onnx.ModelProto) -> list[onnx.TensorProto]:
+    """Return the weight and bias of each convolution, in the order of the graph."""
+    constants = {item.name: item for item in model.graph.initializer}
+    names = [
+        name for node in model.graph.node if node.op_type == "Conv" for name in node.input[1:3]
+    ]
+    assert len(set(names)) == len(names), "a weight that is used twice would be averaged twice"
+    return [constants[name] for name in names]
+
+
+def ship(weights: Path, results: Path | None, output: Path, base: Path | None = None) -> Header:
     """Write the network with its calibration, and return its header.
+
+    With a `base`, the weights are the mean of both; results are those of this mean.
 
     Raises
     ------
     DataError
         The weights are not those of a network of ours, or the results have no calibration for it.
     """
+    before = onnx.load(str(base)) if base else None  # the output may replace it
     if weights.suffix == ".ckpt":
         from_checkpoint(weights, output)
         source = output
@@ -66,14 +92,17 @@ def ship(weights: Path, results: Path | None, output: Path) -> Header:
         found = values.get(OURS) or values.get(str(weights), {})
         if "calibration" not in found:
             raise DataError(f"{results}: has no calibration for {weights}")
-        by_class = {
-            name: found["by_class"][our_name(name) or name]
-            for name in header.classes
-            if (our_name(name) or name) in found["by_class"]
-        }
+        names = {name: our_name(name) or name for name in header.classes}
+        fitted = found["by_class"]
+        by_class = {name: fitted[ours] for name, ours in names.items() if ours in fitted}
         calibrated = {"calibration": found["calibration"], "by_class": by_class}
         header = Header.model_validate(header.model_dump() | calibrated)
-    write_model(onnx.load(str(source)), header, output, overwrite=True)
+    model = onnx.load(str(source))
+    if before is not None:
+        mix(model, before)
+        note = {"average": "mean of the weights of the base and of those after training"}
+        header = header.model_copy(update={"provenance": header.provenance | note})
+    write_model(model, header, output, overwrite=True)
     return header
 
 
@@ -81,9 +110,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("weights", type=Path, help="network (.onnx) or checkpoint (.ckpt)")
     parser.add_argument("--results", type=Path, help="results.json of make unseen")
+    base = "network from which the training started: the mean of both is written"
+    parser.add_argument("--base", type=Path, help=base)
     parser.add_argument("--output", type=Path, default=SHIPPED, help="default: the shipped file")
     arguments = parser.parse_args()
-    header = ship(arguments.weights, arguments.results, arguments.output)
+    header = ship(arguments.weights, arguments.results, arguments.output, arguments.base)
     print(f"{arguments.output}: {arguments.output.stat().st_size:,} bytes")
     print(f"classes: {', '.join(header.classes)}")
     for name in header.classes:

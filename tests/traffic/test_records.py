@@ -78,24 +78,18 @@ class TestPath:
 
 
 class TestMotion:
-    def records_before(self, *, is_still: bool) -> dict[int, tuple[str | None, float]]:
-        """Return the motion and the mean score of vehicles that drive and stand."""
+    def motions(self, *, is_still: bool) -> dict[int, str | None]:
+        """Return the motion of vehicles that drive and stand."""
         made = VehicleRecords(WIDTH)
         for second in range(70):
             tracks = [track(1, Box.sized(3 * second, 100, 40, 30)), track(2, PLACE)]
             if second < 30:
-                tracks.append(track(4, Box.sized(200, 180, 50, 40)))
+                tracks.append(track(3, Box.sized(200, 180, 50, 40)))
             made.add(frame(second, *tracks, rate=1))
-        return {item.id: (item.motion, item.mean_score) for item in made.end(is_still=is_still)}
+        return {item.id: item.motion for item in made.end(is_still=is_still)}
 
     def test_what_stands_is_told_apart_from_what_drives(self) -> None:
-        found = self.records_before(is_still=True)
-        assert {number: motion for number, (motion, _) in found.items()} == {
-            1: "drove",
-            2: "standing",
-            4: "unknown",
-        }
+        assert self.motions(is_still=True) == {1: "drove", 2: "standing", 3: "unknown"}
 
     def test_a_camera_that_moves_leaves_it_open(self) -> None:
-        found = self.records_before(is_still=False)
-        assert {number: motion for number, (motion, _) in found.items()} == dict.fromkeys((1, 2, 4))
+        assert self.motions(is_still=False) == dict.fromkeys((1, 2, 3))

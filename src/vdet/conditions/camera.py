@@ -76,7 +76,7 @@ class CameraWatch:
 
     @property
     def moves(self) -> bool:
-        """Whether it is known not to be fixed."""
+        """Whether it moved in more than a tenth of the planes so far."""
         return self._still_planes < _STILL * len(self._times)
 
     def findings(self) -> list[Finding]:

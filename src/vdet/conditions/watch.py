@@ -1,7 +1,6 @@
 """Watches the conditions of one video: small planes of its frames, and their detections."""
 
 from collections.abc import Sequence
-from dataclasses import astuple
 
 import cv2
 import numpy as np
@@ -57,12 +56,11 @@ class Conditions:
         is_clear = not visibility.reasons(self._measures[-1][np.newaxis], self._wet[-1])[0]
         stood = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
         self._motion.add(time, plane, boxes, stood=stood)
-        shown = np.array([astuple(track.box) for track in tracks]).reshape(-1, 4)
-        self._weak.add(time, picture, detections, shown)
+        self._weak.add(time, picture, detections, tracks)
 
     @property
     def moves(self) -> bool:
-        """Whether the camera is known to move, so far."""
+        """Whether the camera moved in more than a tenth of the planes so far."""
         return self._camera.moves
 
     def findings(self) -> Findings:

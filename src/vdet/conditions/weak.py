@@ -1,40 +1,55 @@
-"""Weak detections that stay in the view of a moving camera: it follows something unclear.
+"""Weak detections that stay in view of a moving camera: possibly a vehicle ahead.
 
-What stands beside the road passes by, and false alarms of single frames do not last. A fixed camera
-always sees its signs and buildings, so this is not for fixed cameras.
+Objects beside the road leave the view, false detections in single frames do not last, and dirt on
+the glass does not move in the frame. Before a fixed camera signs and buildings last, so this is not
+for fixed cameras.
 """
 
-import itertools
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from vdet.boxes import EDGE, Boxes, Float64Array, coverage, iou_matrix
+from vdet.boxes import EDGE, Box, Boxes, Float64Array, coverage, iou_matrix
 from vdet.conditions.finding import Finding, joined, when
 from vdet.media import Picture
+from vdet.track.track import Track
 
 _MIN_SCORE = 0.1
+"""Minimum score of a detection."""
 _MIN_WIDTH = 0.04
-"""Minimum width of a detection, as a fraction of the frame's: smaller ones are countless."""
+"""Minimum width of a detection, as a fraction of the frame's: smaller ones are too frequent."""
 _COVERED = 0.5
-"""Fraction of a detection inside a vehicle that is shown, or the reverse, if it belongs to it."""
+"""Minimum part of a detection in the box of a track, or the reverse, to belong to that track."""
 _SAME_IOU, _GAP = 0.4, 0.5
 """Minimum overlap of consecutive detections of one object, and the maximum seconds between them."""
 _SHORTEST = 3.0
-"""Minimum seconds for which an object is seen."""
+"""Minimum seconds between the first and the last detection of an object."""
+_MOVED = 0.1
+"""Minimum distance from its first position, in sizes; jitter of what is fixed is about 0.03."""
 
 
 @dataclass(slots=True, eq=False)
 class _Object:
-    """What weak detections may show: the latest box, `(4,)`, and the times of all."""
+    """Linked detections of one object."""
 
-    box: Float64Array
-    times: list[float]
+    first: float
+    last: float
+    start: Box
+    box: Box
+    has_moved: bool = False
 
     @property
     def lasts(self) -> bool:
-        """Whether it is seen for long enough."""
-        return self.times[-1] - self.times[0] >= _SHORTEST
+        """Whether it is detected for long enough, and is not fixed to the camera."""
+        return self.last - self.first >= _SHORTEST and self.has_moved
+
+    def add(self, time: float, box: Box) -> None:
+        """Add the next detection."""
+        self.last, self.box = time, box
+        distance = math.dist(self.start.center, box.center)
+        self.has_moved |= distance >= _MOVED * (box.width + box.height) / 2
 
 
 class WeakWatch:
@@ -43,44 +58,46 @@ class WeakWatch:
     def __init__(self) -> None:
         self._objects: list[_Object] = []
 
-    def add(self, time: float, picture: Picture, detections: Boxes, shown: Float64Array) -> None:
-        """Add a frame with its detections, and the boxes of the vehicles shown, `(n, 4)`."""
-        boxes = _weak_boxes(picture, detections, shown)
+    def add(
+        self, time: float, picture: Picture, detections: Boxes, tracks: Sequence[Track]
+    ) -> None:
+        """Add a frame with its detections and its tracks."""
+        boxes = _weak_boxes(picture, detections, tracks)
         for item in self._objects:
-            if time - item.times[-1] > _GAP or not len(boxes):
-                continue
-            overlaps = iou_matrix(item.box[np.newaxis], boxes)[0]
-            best = int(overlaps.argmax())
-            if overlaps[best] >= _SAME_IOU:
-                item.box, boxes = boxes[best], np.delete(boxes, best, axis=0)
-                item.times.append(time)
-        self._objects = [
-            item for item in self._objects if item.lasts or time - item.times[-1] <= _GAP
-        ]
-        self._objects += [_Object(box, [time]) for box in boxes]
+            if len(boxes) and time - item.last <= _GAP:
+                overlaps = iou_matrix(np.array([astuple(item.box)]), boxes)[0]
+                best = int(overlaps.argmax())
+                if overlaps[best] >= _SAME_IOU:
+                    item.add(time, Box(*boxes[best].tolist()))
+                    boxes = np.delete(boxes, best, axis=0)
+        self._objects = [item for item in self._objects if item.lasts or time - item.last <= _GAP]
+        new = (Box(*sides) for sides in boxes.tolist())
+        self._objects += [_Object(time, time, box, box) for box in new]
 
     def findings(self) -> list[Finding]:
-        """Return when something like a vehicle was followed that was too uncertain to show."""
-        lasting = (item.times for item in self._objects if item.lasts)
-        spans = joined(sorted(itertools.chain.from_iterable(lasting)))
-        if not spans:
+        """Return when weak detections lasted without a track."""
+        lasting = [item for item in self._objects if item.lasts]
+        seconds = {n for item in lasting for n in range(int(item.first), int(item.last) + 1)}
+        if not seconds:
             return []
+        spans = joined(sorted(seconds))
         text = (
-            f"something ahead looks like a vehicle {when(spans)}, too uncertain to show: "
-            "look at these times"
+            f"there may be an undetected vehicle ahead {when(spans)}: its detections score too low "
+            "to be shown; check these times"
         )
         return [Finding("uncertain", text, tuple(spans))]
 
 
-def _weak_boxes(picture: Picture, detections: Boxes, shown: Float64Array) -> Float64Array:
-    """Return the boxes of weak detections apart from `shown`, and not of the camera's own vehicle.
+def _weak_boxes(picture: Picture, detections: Boxes, tracks: Sequence[Track]) -> Float64Array:
+    """Return the boxes of weak detections, `(n, 4)`, without those of tracks.
 
-    That one reaches the lower edge of the frame.
+    A box at the lower edge of the frame may be that of the camera's own vehicle, and is omitted.
     """
     sides = detections.sides
     rows = detections.scores >= _MIN_SCORE
     rows &= sides[:, 2] - sides[:, 0] >= _MIN_WIDTH * picture.width
     rows &= sides[:, 3] < (1 - EDGE) * picture.height
     sides = sides[rows]
+    shown = np.array([astuple(track.box) for track in tracks]).reshape(-1, 4)
     inside = np.maximum(coverage(sides, shown), coverage(shown, sides).T)
     return np.asarray(sides[inside.max(axis=1, initial=0) < _COVERED])

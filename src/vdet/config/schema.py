@@ -85,7 +85,7 @@ class ConditionSettings(Section):
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
     """Codes of findings to suppress: camera-moves, camera-moved, unexplained-motion, dark, haze,
-    blur, drops, lane-geometry, small-frames, traces.
+    blur, drops, lane-geometry, small-frames, traces, uncertain.
     """
 
 

@@ -19,6 +19,8 @@ class TrackerSettings(Section):
     """Seconds of video to search ahead of a frame before it is shown, so that vehicles are shown
     from their first detection to their last. 0: show frames at once.
     """
+    min_score_standing: Ratio = 0.6
+    """Before a fixed camera: minimum score of a vehicle that has not moved to be shown."""
 
 
 class MotionTrackerSettings(TrackerSettings):
@@ -35,7 +37,7 @@ class MotionTrackerSettings(TrackerSettings):
     """
     min_score: Ratio = 0.4
     """Minimum mean score of a vehicle's latest detections to be shown. Values below
-    detector.min_score have no effect.
+    detector.min_score have no effect. See min_score_standing.
     """
     confirm_seconds: Seconds = 0.1
     """Evidence needed to show a vehicle: seconds of detections with score 1."""

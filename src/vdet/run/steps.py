@@ -23,10 +23,12 @@ if TYPE_CHECKING:  # what an image does not need is loaded where it is used
     from vdet.lanes.road import Road, RoadFinder
 
 _MOVED = 0.2
-"""Minimum distance from its start of a vehicle that moves, in its sizes; jitter is a tenth of that.
+"""Minimum distance of a moving vehicle from its first position, in its sizes.
+
+Jitter of boxes is about 0.03. Counts and records need more, to be sure: see `has_moved`.
 """
-_MIN_STANDING_SCORE = 0.6
-"""Minimum score of a vehicle that has not moved."""
+_CELL = 0.01
+"""Side of the cells in which vehicles drove, as a fraction of the width."""
 
 
 class Step(Protocol):
@@ -89,7 +91,8 @@ def make_steps(context: StepContext) -> list[Step]:
         from vdet.conditions.watch import Conditions
 
         conditions = Conditions(settings, width)
-        steps += [ConditionStep(conditions), StandingStep(conditions)]
+        min_score = settings.tracker.min_score_standing
+        steps += [ConditionStep(conditions), StandingStep(conditions, min_score, width)]
     if settings.lanes.enabled:
         from vdet.lanes.road import RoadFinder
 
@@ -121,28 +124,39 @@ class ConditionStep:
 
 
 class StandingStep:
-    """Hides what has not moved before a fixed camera, and scores low: usually a sign or a building.
+    """Hides the tracks that have not moved and score low, if the camera is fixed.
 
-    It is shown from when it moves, or scores high.
+    They are usually signs or buildings. A track is shown as soon as it moves, reaches the score, or
+    another one has driven where it is.
     """
 
-    def __init__(self, conditions: "Conditions") -> None:
+    def __init__(self, conditions: "Conditions", min_score: float, width: int) -> None:
         self._conditions = conditions
+        self._min_score = min_score
+        self._cell = _CELL * width
         self._starts: dict[int, Point] = {}
         self._shown: set[int] = set()
+        self._driven: set[Point] = set()
 
     def apply(self, result: FrameResult) -> FrameResult:
-        """Keep the vehicles that moved or score high; all, if the camera moves."""
+        """Keep the tracks to show; all, if the camera moves."""
         for track in result.tracks:
             start = self._starts.setdefault(track.id, track.foot)
             size = (track.box.width + track.box.height) / 2
-            moved = math.dist(start, track.foot) >= _MOVED * size
-            if moved or track.score >= _MIN_STANDING_SCORE:
+            if math.dist(start, track.foot) >= _MOVED * size:
+                x, y = (round(value / self._cell) * self._cell for value in track.foot)
+                self._driven.add((x, y))
+                self._shown.add(track.id)
+            elif track.score >= self._min_score:
                 self._shown.add(track.id)
         if self._conditions.moves:
             return result
-        tracks = tuple(track for track in result.tracks if track.id in self._shown)
-        return replace(result, tracks=tracks)
+        return replace(result, tracks=tuple(filter(self._is_shown, result.tracks)))
+
+    def _is_shown(self, track: Track) -> bool:
+        if track.id not in self._shown and any(map(track.box.contains, self._driven)):
+            self._shown.add(track.id)
+        return track.id in self._shown
 
 
 class LaneStep:

@@ -18,8 +18,8 @@ class Track:
     Attributes
     ----------
     id
-        1, 2, 3 … in the order in which the vehicles of a video are first shown; ids are never
-        reused.
+        1, 2, 3 … in the order in which the tracker first shows the vehicles of a video; ids are
+        never reused. Steps that hide a track leave gaps.
     box
         In pixels of the full frame. From the motion tracker: the estimate for this frame, clipped
         to it. From the rules tracker: the average of the last `tracker.history` rectangles, in

@@ -194,8 +194,9 @@ class VehicleRecords:
         for number, speeds in (meter.speeds() if meter else {}).items():
             self._vehicles[number].speeds = speeds
         records = [record for _, record in sorted(self._vehicles.items())]
-        for record in records if is_still else ():
-            record.judge()
+        if is_still:
+            for record in records:
+                record.judge()
         return tuple(records)
 
     def _show(self) -> None:

@@ -32,7 +32,7 @@ _RARE = 0.5  # a class with fewer objects than this fraction of the mean is rare
 _MARGIN = 0.2  # surroundings of a pasted object on each side, fraction of the box
 _MIN_DONOR = 24.0  # longer side of an object to paste, pixels
 _PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the image's height
-_MAX_COVERED = 0.45  # of another object by a pasted one: traffic is dense
+_MAX_COVERED = 0.45  # maximum fraction of another object that a pasted one hides
 _SIGNS = 0.3  # fraction of images that get signs
 _MAX_SIGNS = 3  # signs in an image
 
