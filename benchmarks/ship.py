@@ -1,9 +1,10 @@
 """From the weights of a training to the shipped network: `make ship WEIGHTS=net.onnx`.
 
 The weights are those of `vdet train-net`, a network or a checkpoint, also of earlier code; with
-`--base`, the mean of these and of the network from which the training started. The
+`--base`, a weighted mean of these and of the network from which the training started. The
 calibration of its scores comes from the results of `make unseen`: that of the networks that were
 trained without what they were measured on, or, where these are not there, that of the same network.
+Without results, it is that of the base.
 """
 
 import argparse
@@ -47,14 +48,16 @@ def from_checkpoint(path: Path, output: Path) -> None:
     export_network(network, header, output, overwrite=True)
 
 
-def mix(model: onnx.ModelProto, base: onnx.ModelProto) -> None:
+def mix(model: onnx.ModelProto, base: onnx.ModelProto, share: float) -> None:
     """Average the weights of a network with those of its base, which may lack the last classes.
+
+    `share` is the weight of the first.
 
     Source: Wortsman et al., "Robust fine-tuning of zero-shot models", 2022.
     """
     for new, old in zip(_weights(model), _weights(base), strict=True):
         values, before = numpy_helper.to_array(new).copy(), numpy_helper.to_array(old)
-        values[: len(before)] = (values[: len(before)] + before) / 2
+        values[: len(before)] += (1 - share) * (before - values[: len(before)])
         new.CopyFrom(numpy_helper.from_array(values, new.name))
 
 
@@ -68,10 +71,17 @@ def _weights(model: onnx.ModelProto) -> list[onnx.TensorProto]:
     return [constants[name] for name in names]
 
 
-def ship(weights: Path, results: Path | None, output: Path, base: Path | None = None) -> Header:
+def ship(
+    weights: Path,
+    results: Path | None,
+    output: Path,
+    base: Path | None = None,
+    share: float = 0.5,
+) -> Header:
     """Write the network with its calibration, and return its header.
 
-    With a `base`, the weights are the mean of both; results are those of this mean.
+    With a `base`, the weights are the mean of both, with the weight `share` for the first; results
+    are those of this mean.
 
     Raises
     ------
@@ -79,6 +89,7 @@ def ship(weights: Path, results: Path | None, output: Path, base: Path | None = 
         The weights are not those of a network of ours, or the results have no calibration for it.
     """
     before = onnx.load(str(base)) if base else None  # the output may replace it
+    calibrated = _calibration(read_header(Session(base))) if base else {}
     if weights.suffix == ".ckpt":
         from_checkpoint(weights, output)
         source = output
@@ -96,25 +107,34 @@ def ship(weights: Path, results: Path | None, output: Path, base: Path | None = 
         fitted = found["by_class"]
         by_class = {name: fitted[ours] for name, ours in names.items() if ours in fitted}
         calibrated = {"calibration": found["calibration"], "by_class": by_class}
-        header = Header.model_validate(header.model_dump() | calibrated)
     model = onnx.load(str(source))
-    if before is not None:
-        mix(model, before)
-        note = {"average": "mean of the weights of the base and of those after training"}
-        header = header.model_copy(update={"provenance": header.provenance | note})
+    if before is not None and share < 1:
+        mix(model, before, share)
+        average = f"{share:g} of the weights after these steps, and {1 - share:g} of the base"
+        calibrated["provenance"] = header.provenance | {"average": average}
+    header = Header.model_validate(header.model_dump() | calibrated)
     write_model(model, header, output, overwrite=True)
     return header
+
+
+def _calibration(header: Header | None) -> dict[str, Any]:
+    """Return the calibration in a header, as JSON values."""
+    values = header.model_dump() if header else {}
+    return {name: values[name] for name in ("calibration", "by_class") if name in values}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("weights", type=Path, help="network (.onnx) or checkpoint (.ckpt)")
     parser.add_argument("--results", type=Path, help="results.json of make unseen")
-    base = "network from which the training started: the mean of both is written"
+    base = "network from which the training started: a mean of both is written"
     parser.add_argument("--base", type=Path, help=base)
+    parser.add_argument("--share", type=float, default=0.5, help="weight of WEIGHTS in that mean")
     parser.add_argument("--output", type=Path, default=SHIPPED, help="default: the shipped file")
     arguments = parser.parse_args()
-    header = ship(arguments.weights, arguments.results, arguments.output, arguments.base)
+    header = ship(
+        arguments.weights, arguments.results, arguments.output, arguments.base, arguments.share
+    )
     print(f"{arguments.output}: {arguments.output.stat().st_size:,} bytes")
     print(f"classes: {', '.join(header.classes)}")
     for name in header.classes:
