@@ -4,12 +4,13 @@ A step is made for one video or one image. An entry point of the group `vdet.ste
 that takes a `StepContext` and returns a step, or None if the settings do not enable it.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from vdet.boxes import Image
+from vdet.boxes import Box, Image
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
@@ -136,7 +137,8 @@ class StandingStep:
         self._cell = _CELL * width
         self._starts: dict[int, Point] = {}
         self._shown: set[int] = set()
-        self._driven: set[Point] = set()
+        self._driven: set[tuple[int, int]] = set()
+        """Column and row of the cells in which a vehicle drove."""
 
     def apply(self, result: FrameResult) -> FrameResult:
         """Keep the tracks to show; all, if the camera moves."""
@@ -144,8 +146,7 @@ class StandingStep:
             start = self._starts.setdefault(track.id, track.foot)
             size = (track.box.width + track.box.height) / 2
             if math.dist(start, track.foot) >= _MOVED * size:
-                x, y = (round(value / self._cell) * self._cell for value in track.foot)
-                self._driven.add((x, y))
+                self._driven.add(self._cell_of(*track.foot))
                 self._shown.add(track.id)
             elif track.score >= self._min_score:
                 self._shown.add(track.id)
@@ -154,9 +155,19 @@ class StandingStep:
         return replace(result, tracks=tuple(filter(self._is_shown, result.tracks)))
 
     def _is_shown(self, track: Track) -> bool:
-        if track.id not in self._shown and any(map(track.box.contains, self._driven)):
+        if track.id not in self._shown and self._was_driven(track.box):
             self._shown.add(track.id)
         return track.id in self._shown
+
+    def _was_driven(self, box: Box) -> bool:
+        """Return whether a vehicle drove in a cell of a box."""
+        left, top = self._cell_of(box.x1, box.y1)
+        right, bottom = self._cell_of(box.x2, box.y2)
+        columns, rows = range(left, right + 1), range(top, bottom + 1)
+        return any(cell in self._driven for cell in itertools.product(columns, rows))
+
+    def _cell_of(self, x: float, y: float) -> tuple[int, int]:
+        return int(x // self._cell), int(y // self._cell)
 
 
 class LaneStep:
