@@ -86,18 +86,19 @@ def ship(
     Raises
     ------
     DataError
-        The weights are not those of a network of ours, or the results have no calibration for it.
+        The weights or the base are not those of a network of ours, or the results have no
+        calibration for it.
     """
+    calibrated: dict[str, Any] = {}
     before = onnx.load(str(base)) if base else None  # the output may replace it
-    calibrated = _calibration(read_header(Session(base))) if base else {}
+    if base is not None:
+        calibrated = _header(base).model_dump(include={"calibration", "by_class"})
     if weights.suffix == ".ckpt":
         from_checkpoint(weights, output)
         source = output
     else:
         source = weights
-    header = read_header(Session(source))
-    if header is None:
-        raise DataError(f"{weights}: is not a network of vdet train-net")
+    header = _header(source)
     if results is not None:
         values = json.loads(results.read_text(encoding="utf-8"))
         found = values.get(OURS) or values.get(str(weights), {})
@@ -117,10 +118,12 @@ def ship(
     return header
 
 
-def _calibration(header: Header | None) -> dict[str, Any]:
-    """Return the calibration in a header, as JSON values."""
-    values = header.model_dump() if header else {}
-    return {name: values[name] for name in ("calibration", "by_class") if name in values}
+def _header(path: Path) -> Header:
+    """Return the header of a network of ours. Raises `DataError`."""
+    header = read_header(Session(path))
+    if header is None:
+        raise DataError(f"{path}: is not a network of vdet train-net")
+    return header
 
 
 def main() -> None:

@@ -71,6 +71,11 @@ class Box:
         return max(0.0, self.width) * max(0.0, self.height)
 
     @property
+    def size(self) -> float:
+        """The mean of width and height."""
+        return (self.width + self.height) / 2
+
+    @property
     def center(self) -> tuple[float, float]:
         """The middle, `(x, y)`."""
         return (self.x1 + self.x2) / 2, (self.y1 + self.y2) / 2

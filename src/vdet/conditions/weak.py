@@ -49,7 +49,7 @@ class _Object:
         """Add the next detection."""
         self.last, self.box = time, box
         distance = math.dist(self.start.center, box.center)
-        self.has_moved |= distance >= _MOVED * (box.width + box.height) / 2
+        self.has_moved |= distance >= _MOVED * box.size
 
 
 class WeakWatch:

@@ -106,70 +106,6 @@ def make_steps(context: StepContext) -> list[Step]:
     return [step for step in steps if step is not None]
 
 
-class ConditionStep:
-    """Watches for reasons to doubt the results, without changing them."""
-
-    def __init__(self, conditions: "Conditions") -> None:
-        self._conditions = conditions
-
-    def apply(self, result: FrameResult) -> FrameResult:
-        """Analyse a searched frame."""
-        if result.searched:
-            time, picture = float(result.frame.time), result.frame.picture
-            self._conditions.add(time, picture, result.detections, result.tracks)
-        return result
-
-    def finish(self) -> Facts:
-        """Return the findings about the video."""
-        return {CONDITIONS: self._conditions.findings()}
-
-
-class StandingStep:
-    """Hides the tracks that have not moved and score low, if the camera is fixed.
-
-    They are usually signs or buildings. A track is shown as soon as it moves, reaches the score, or
-    another one has driven where it is.
-    """
-
-    def __init__(self, conditions: "Conditions", min_score: float, width: int) -> None:
-        self._conditions = conditions
-        self._min_score = min_score
-        self._cell = _CELL * width
-        self._starts: dict[int, Point] = {}
-        self._shown: set[int] = set()
-        self._driven: set[tuple[int, int]] = set()
-        """Column and row of the cells in which a vehicle drove."""
-
-    def apply(self, result: FrameResult) -> FrameResult:
-        """Keep the tracks to show; all, if the camera moves."""
-        for track in result.tracks:
-            start = self._starts.setdefault(track.id, track.foot)
-            size = (track.box.width + track.box.height) / 2
-            if math.dist(start, track.foot) >= _MOVED * size:
-                self._driven.add(self._cell_of(*track.foot))
-                self._shown.add(track.id)
-            elif track.score >= self._min_score:
-                self._shown.add(track.id)
-        if self._conditions.moves:
-            return result
-        return replace(result, tracks=tuple(filter(self._is_shown, result.tracks)))
-
-    def _is_shown(self, track: Track) -> bool:
-        if track.id not in self._shown and self._was_driven(track.box):
-            self._shown.add(track.id)
-        return track.id in self._shown
-
-    def _was_driven(self, box: Box) -> bool:
-        """Return whether a vehicle drove in a cell of a box."""
-        left, top = self._cell_of(box.x1, box.y1)
-        right, bottom = self._cell_of(box.x2, box.y2)
-        columns, rows = range(left, right + 1), range(top, bottom + 1)
-        return any(cell in self._driven for cell in itertools.product(columns, rows))
-
-    def _cell_of(self, x: float, y: float) -> tuple[int, int]:
-        return int(x // self._cell), int(y // self._cell)
-
-
 class LaneStep:
     """Finds the lane, and the distance and the lane of each vehicle."""
 
@@ -225,3 +161,66 @@ class RegionStep:
 def tracks_inside(regions: Regions, tracks: Sequence[Track]) -> tuple[Track, ...]:
     """Return the vehicles whose foot is inside the regions."""
     return tuple(track for track in tracks if regions.contains(track.foot))
+
+
+class ConditionStep:
+    """Watches for reasons to doubt the results, without changing them."""
+
+    def __init__(self, conditions: "Conditions") -> None:
+        self._conditions = conditions
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Analyse a searched frame."""
+        if result.searched:
+            time, picture = float(result.frame.time), result.frame.picture
+            self._conditions.add(time, picture, result.detections, result.tracks)
+        return result
+
+    def finish(self) -> Facts:
+        """Return the findings about the video."""
+        return {CONDITIONS: self._conditions.findings()}
+
+
+class StandingStep:
+    """Hides the tracks that have not moved and score low, if the camera is fixed.
+
+    They are usually signs or buildings. A track is shown as soon as it moves, reaches the score, or
+    another one has driven where it is.
+    """
+
+    def __init__(self, conditions: "Conditions", min_score: float, width: int) -> None:
+        self._conditions = conditions
+        self._min_score = min_score
+        self._cell = _CELL * width
+        self._starts: dict[int, Point] = {}
+        self._shown: set[int] = set()
+        self._driven: set[tuple[int, int]] = set()
+        """Column and row of the cells in which a vehicle drove."""
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Keep the tracks to show; all, if the camera moves."""
+        for track in result.tracks:
+            start = self._starts.setdefault(track.id, track.foot)
+            if math.dist(start, track.foot) >= _MOVED * track.box.size:
+                self._driven.add(self._cell_of(*track.foot))
+                self._shown.add(track.id)
+            elif track.score >= self._min_score:
+                self._shown.add(track.id)
+        if self._conditions.moves:
+            return result
+        return replace(result, tracks=tuple(filter(self._is_shown, result.tracks)))
+
+    def _is_shown(self, track: Track) -> bool:
+        if track.id not in self._shown and self._was_driven(track.box):
+            self._shown.add(track.id)
+        return track.id in self._shown
+
+    def _was_driven(self, box: Box) -> bool:
+        """Return whether a vehicle drove in a cell of a box."""
+        left, top = self._cell_of(box.x1, box.y1)
+        right, bottom = self._cell_of(box.x2, box.y2)
+        columns, rows = range(left, right + 1), range(top, bottom + 1)
+        return any(cell in self._driven for cell in itertools.product(columns, rows))
+
+    def _cell_of(self, x: float, y: float) -> tuple[int, int]:
+        return int(x // self._cell), int(y // self._cell)

@@ -142,8 +142,8 @@ class VehicleRecord:
     def judge(self) -> None:
         """Set `motion`, for a still camera."""
         stood: Motion = "standing" if self.seconds >= _STANDING else "unknown"
-        size = (self.largest.width + self.largest.height) / 2
-        self.motion = "drove" if has_moved(np.array(self.path), size) else stood
+        moved = has_moved(np.array(self.path), self.largest.size)
+        self.motion = "drove" if moved else stood
 
     def _go_to(self, point: Point) -> None:
         """Continue the path; a last point less than a step from the previous one is replaced."""
