@@ -287,15 +287,17 @@ def test_each_video_of_a_batch_has_its_counts(
     clips.mkdir(parents=True)
     for name in "ab":
         (clips / f"{name}.mp4").write_bytes((folder / "red.mp4").read_bytes())
-    outputs = ("--counts", ".counts.csv", "--flows", ".flows.matrix.csv")
+    outputs = ("--counts", ".counts.csv", "--flows", ".flows.json")
     wanted = ("--no-video", *outputs, "-c", folder / "lines.yaml")
     out = tmp_path / "found"
     run("detect-video", clips.parent, "-d", out, *red, *wanted, "--jobs", "1", code=0)
     own = events_of(out / "day" / "a.counts.csv")
     assert own == events_of(out / "day" / "b.counts.csv")
-    heading, *rows = (out / "day" / "a.flows.matrix.csv").read_text().splitlines()
-    assert heading == "from,gate,yard,(none)"
-    assert rows == ["gate,0,1,0", "yard,0,0,0"]
+    matrix = json.loads((out / "day" / "a.flows.json").read_text())["matrix"]
+    assert {origin: list(row.values()) for origin, row in matrix.items()} == {
+        "gate": [0, 1, 0],
+        "yard": [0, 0, 0],
+    }
 
 
 @pytest.mark.parametrize(

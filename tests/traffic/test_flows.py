@@ -198,13 +198,13 @@ class TestFiles:
         assert [row["to"] for row in rows_of(tmp_path / "g.csv")] == ["(none)"]
 
     def test_the_matrix_has_every_name_in_both_ways(self, tmp_path: Path) -> None:
-        self.write(flows_content, tmp_path / "f.matrix.csv", {"v": crossing()}, 5)
-        assert (tmp_path / "f.matrix.csv").read_text() == (
-            "from,west,east,'=south,(none)\n"
-            "west,1,1,1,0\n"
-            "east,0,0,0,0\n"
-            "'=south,0,0,0,0\n"
-        )  # fmt: skip
+        nothing = {"west": 0, "east": 0, "=south": 0, "(none)": 0}
+        self.write(flows_content, tmp_path / "f.json", {"v": crossing()}, 5)
+        assert json.loads((tmp_path / "f.json").read_text())["matrix"] == {
+            "west": {"west": 1, "east": 1, "=south": 1, "(none)": 0},
+            "east": nothing,
+            "=south": nothing,
+        }
 
     def test_the_wide_table_has_a_column_for_each_class_of_the_settings(
         self, tmp_path: Path

@@ -79,7 +79,7 @@ counts_option = output_files(
 flows_option = output_files(
     "--flows",
     help="Write flows from one line or zone to another: .csv has a row for each interval, flow and "
-    "class, .wide.csv has a row for each interval, with sums, .matrix.csv has a matrix, .json has "
+    "class, .wide.csv has a row for each interval, with sums, .json has "
     "the flows and the matrix, .xlsx is as for --counts. Can be repeated.",
 )
 interval_option = click.option(

@@ -14,18 +14,14 @@ from vdet.run.sinks import Output
 @command()
 @click.argument("source_path", type=options.PATH, metavar="IN")
 @options.tracks_from_option(required=True)
-@options.output_folder("-o", "--output", help="Folder for the page, review.html.")
-@options.output_folder("--export", help="Folder for labelled images of the checked vehicles.")
-@options.corrections_option
+@options.output_folder("-o", "--output", required=True, help="Folder for the page, review.html.")
 @options.start_option
 @options.end_option
 @options.settings_options()
 @options.overwrite_option
 def review(
     source_path: Path,
-    output: Path | None,
-    export: Path | None,
-    corrections: options.Paths,
+    output: Path,
     tracks: Path,
     start: Fraction | None,
     end: Fraction | None,
@@ -35,36 +31,27 @@ def review(
     """Write a page for checking the counts of a video.
 
     IN is a video, read again but not searched. The page has a strip of each line, which shows
-    everything that crossed it, with a mark for each counted vehicle. It saves corrections. With
-    them, --export writes the checked vehicles instead of the page.
+    everything that crossed it, with a mark for each counted vehicle. It saves corrections.
 
     \b
-    Examples:
+    Example:
       vdet review in.mp4 --tracks-from tracks.jsonl -c gate.yaml -o review
-      vdet review in.mp4 --tracks-from tracks.jsonl -c gate.yaml --corrections c.yaml --export set
     """
-    from vdet.run.export import export_checked
     from vdet.run.review import write_saved_review
     from vdet.run.video import Run
 
-    if bool(output) == bool(export) or bool(export) != bool(corrections):
-        raise click.UsageError("pass -o, or --export and --corrections")
     settings = source.load()
     if not settings.traffic:
         raise click.UsageError("no lines or zones to review; add a settings file with -c FILE")
     run = Run(
         source_path,
-        outputs=(Output("review", output),) if output else (),
+        outputs=(Output("review", output),),
         settings=settings,
         start=start,
         end=end,
         overwrite=overwrite,
         settings_files=(*source.files, tracks),
-        corrections=corrections,
     )
     with progress_steps(" frames") as steps:
-        if export:
-            export_checked(run, tracks, export, steps)
-        else:
-            write_saved_review(run, tracks, steps)
-    print_lines(f"{export or output}: written")
+        write_saved_review(run, tracks, steps)
+    print_lines(f"{output}: written")

@@ -31,7 +31,7 @@ ALL = "all"
 """In wide tables, the name of a sum."""
 
 COUNT_SUFFIXES = (".csv", ".json", ".totals.csv", ".zones.csv", ".wide.csv", ".xlsx")
-FLOW_SUFFIXES = (".csv", ".json", ".matrix.csv", ".wide.csv", ".xlsx")
+FLOW_SUFFIXES = (".csv", ".json", ".wide.csv", ".xlsx")
 
 Videos = Mapping[str, Counts]
 """The counts of videos by their names."""
@@ -76,20 +76,17 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
 
 
 def flows_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
-    """Return the flows, or by the ending of `path` a wide table, the matrix, or all as JSON.
+    """Return the flows, or by the ending of `path` a wide table, or all as JSON.
 
     Parameters and errors as for `counts_content`.
     """
     every = list(videos.values())
-    rows, matrix = tables.flow_table(every, interval), flow_matrix(every)
+    rows = tables.flow_table(every, interval)
     if is_json(path):
-        content = {"flows": _items(_FLOWS, rows), "matrix": matrix}
+        content = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every)}
         return _json(videos, interval, content, events=False)
     if _is_table(path, ".wide"):
         return wide_table(rows, tables.class_columns(every), " to ", has_total=True)
-    if _is_table(path, ".matrix"):
-        body = ((origin, *row.values()) for origin, row in matrix.items())
-        return [("from", *matrix, NOWHERE), *body]
     return [_FLOWS, *map(_cells, rows)]
 
 
