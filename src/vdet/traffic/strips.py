@@ -154,11 +154,10 @@ class _Map:
         maps = cv2.convertMaps(x.astype(np.float32), y.astype(np.float32), cv2.CV_16SC2)
         return cls(np.asarray(maps[0], np.int16), np.asarray(maps[1], np.uint16))
 
-    def cut(self, layer: Image, origin: tuple[int, int]) -> Image:
-        """Return the pixels of a layer that begins at `origin`."""
-        pixels = self.pixels - np.array(origin, np.int16) if any(origin) else self.pixels
+    def cut(self, layer: Image) -> Image:
+        """Return the pixels of a layer."""
         edge = cv2.BORDER_REPLICATE
-        cut = cv2.remap(layer, pixels, self.fractions, cv2.INTER_LINEAR, borderMode=edge)
+        cut = cv2.remap(layer, self.pixels, self.fractions, cv2.INTER_LINEAR, borderMode=edge)
         return np.asarray(cut, np.uint8)
 
 
@@ -185,22 +184,16 @@ class Sampling:
         half = _Map.of((x - 0.5) / 2, (y - 0.5) / 2)
         return cls(len(x), is_upward, _Map.of(x, y), half)
 
-    def cut(self, layers: Sequence[Image], origin: tuple[int, int] = (0, 0)) -> Image:
+    def cut(self, layers: Sequence[Image]) -> Image:
         """Return the band of a frame, uint8 `(rows, samples, 3)`.
 
-        Parameters
-        ----------
-        layers
-            The frame, BGR, or its luma, blue and red: so they are the channels of the band.
-        origin
-            The pixel of the frame at which the layers begin; even numbers.
+        The layers are the frame, BGR, or its luma, blue and red; so are the channels of the band.
         """
         first, *chroma = layers
-        cut = self._full.cut(first, origin)
+        cut = self._full.cut(first)
         if not chroma:
             return cut
-        half = origin[0] // 2, origin[1] // 2
-        merged = cv2.merge([cut, *(self._half.cut(layer, half) for layer in chroma)])
+        merged = cv2.merge([cut, *map(self._half.cut, chroma)])
         return np.asarray(merged, np.uint8)
 
 
@@ -244,28 +237,3 @@ def _velocities(
     means = weights @ measured / np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
     speeds = np.hypot(*means.T)[:, np.newaxis]
     return np.asarray(np.where(speeds < _SLOW, most * _SLOW * normal, means))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Surroundings:
-    """The part of a frame around a band, as layers for `Sampling.cut`, and their origin."""
-
-    layers: tuple[Image, ...]
-    origin: tuple[int, int]
-
-    @classmethod
-    def of(cls, band: Band, picture: Picture) -> "Surroundings":
-        """Copy what lies within a twelfth of the frame's height of a band."""
-        margin = picture.height / 12
-        xs, ys = (sorted(values) for values in zip(band.start, band.end, strict=True))
-        left, top = (max(0, int(values[0] - margin)) // 2 * 2 for values in (xs, ys))
-        right, bottom = (int(values[1] + margin) + 2 for values in (xs, ys))
-        full, *half = layers_of(picture)
-        parts = [full[top:bottom, left:right]]
-        parts += [layer[top // 2 : bottom // 2 + 1, left // 2 : right // 2 + 1] for layer in half]
-        return cls(tuple(part.copy() for part in parts), (left, top))
-
-    @property
-    def nbytes(self) -> int:
-        """Size of the layers, bytes."""
-        return sum(layer.nbytes for layer in self.layers)

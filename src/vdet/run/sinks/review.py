@@ -27,7 +27,6 @@ from vdet.traffic.strips import (
     Passage,
     Passages,
     Sampling,
-    Surroundings,
     bands_of,
     layers_of,
     sampling_of,
@@ -37,8 +36,6 @@ from vdet.traffic.traces import Trace, TraceSearch
 _MINUTE = 60
 _ENOUGH = 6
 """Number of passages after which the sampling of a band is final."""
-_WAITING_BYTES = 48_000_000
-"""Maximum memory of the frames of one band that wait for its sampling."""
 _COLUMN_ROWS = 800
 """Approximate height of the columns that a strip is cut into, pixels."""
 _CROP_SIDE = 120
@@ -59,36 +56,27 @@ class _Spot:
 
 @dataclass(slots=True)
 class _Strip:
-    """The strip of a band in the current minute; frames wait until its sampling is chosen.
+    """The strip of a band in the current minute, whose frames have their seconds in it.
 
-    Frames have their seconds in the minute.
+    The frames before the first passages have a single row, and are stretched.
     """
 
     band: Band
     search: TraceSearch
-    sampling: Sampling | None = None
-    is_final: bool = False
+    sampling: Sampling
     rows: list[tuple[float, Image]] = field(default_factory=list)
-    waiting: list[tuple[float, Surroundings]] = field(default_factory=list)
-    waiting_bytes: int = 0
+    passed: int = 0
 
     def add(self, seconds: float, picture: Picture, passages: list[Passage]) -> None:
         """Add a frame."""
-        if self.sampling:
-            self.rows.append((seconds, self.sampling.cut(layers_of(picture))))
-            return
-        self.waiting.append((seconds, Surroundings.of(self.band, picture)))
-        self.waiting_bytes += self.waiting[-1][1].nbytes
-        if len(passages) >= _ENOUGH or self.waiting_bytes > _WAITING_BYTES:
-            self.decide(passages)
+        if len(passages) >= _ENOUGH:
+            self.improve(passages)
+        self.rows.append((seconds, self.sampling.cut(layers_of(picture))))
 
-    def decide(self, passages: list[Passage]) -> None:
-        """Choose the sampling by the passages so far, and sample the frames that wait."""
-        self.sampling = sampling_of(self.band, passages)
-        self.is_final = len(passages) >= _ENOUGH
-        cut = self.sampling.cut
-        self.rows += [(seconds, cut(part.layers, part.origin)) for seconds, part in self.waiting]
-        self.waiting, self.waiting_bytes = [], 0
+    def improve(self, passages: list[Passage]) -> None:
+        """Choose the sampling by the passages so far, unless it was chosen by enough of them."""
+        if self.passed < _ENOUGH:
+            self.sampling, self.passed = sampling_of(self.band, passages), len(passages)
 
 
 class ReviewSink(BaseSink):
@@ -103,7 +91,8 @@ class ReviewSink(BaseSink):
         self._file = context.files.stage_folder(path) / PAGE_NAME
         bands = bands_of((*counter.lines, *counter.zones))
         self._strips = [
-            _Strip(band, TraceSearch(number, band)) for number, band in enumerate(bands)
+            _Strip(band, TraceSearch(number, band), sampling_of(band, ()))
+            for number, band in enumerate(bands)
         ]
         self._tracks: list[FrameTracks] = []
         self._traces: list[Trace] = []
@@ -139,18 +128,16 @@ class ReviewSink(BaseSink):
         for number, (strip, passages) in enumerate(
             zip(self._strips, self._passages.by_band, strict=True)
         ):
-            if strip.waiting:
-                strip.decide(passages)
-            if strip.rows and strip.sampling:
-                self._write_minute(number, strip, strip.sampling)
+            if strip.rows:
+                strip.improve(passages)
+                self._write_minute(number, strip)
                 rows = [rows for _, rows in strip.rows]
                 self._traces += strip.search.search(self._tracks, rows, passages, is_end=is_end)
             strip.rows = []
-            if not strip.is_final:
-                strip.sampling = None
         self._tracks = []
 
-    def _write_minute(self, number: int, strip: _Strip, sampling: Sampling) -> None:
+    def _write_minute(self, number: int, strip: _Strip) -> None:
+        sampling = strip.sampling
         rate = sampling.rows * float(self.video.rate)  # rows a second
         last = strip.rows[-1][0]
         seconds = min(max(1, round(_COLUMN_ROWS / rate)), int(last) + 1)
@@ -158,7 +145,8 @@ class ReviewSink(BaseSink):
         image = np.full((height, columns, strip.band.samples, 3), 128, np.uint8)
         for time, rows in strip.rows:
             column, top = int(time // seconds), round(time % seconds * rate)
-            part = rows[: height - top]
+            stretched = rows[np.arange(sampling.rows) * len(rows) // sampling.rows]
+            part = stretched[: height - top]
             image[top : top + len(part), column] = part
         flat = image.reshape(height, -1, 3)
         if self._coding:
