@@ -17,10 +17,10 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Boxes, Image
-from vdet.conditions.finding import Findings
 from vdet.conditions.watch import Conditions
 from vdet.config.schema import Settings
 from vdet.config.shapes import LineSettings, TrafficSettings
+from vdet.findings import Findings
 from vdet.media import Picture
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, pole_scene

@@ -25,6 +25,7 @@ from benchmarks.pole_cameras import MIN_WIDTH
 from vdet.boxes import NO_BOXES, Image
 from vdet.config.schema import Settings
 from vdet.files import OutputFiles
+from vdet.findings import Findings
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.pages.review import PAGE_NAME
 from vdet.run.result import FrameResult
@@ -280,8 +281,8 @@ def write_page(road: Hour, folder: Path) -> Survey:
                 true_tracks = road.tracks(frame.index, is_true=True, boxes=boxes)
                 true.add(true_tracks)
                 passages.add(true_tracks)
-            traffic.end()
-    true.end()
+            traffic.end(Findings())
+    true.end(Findings())
     counts, true_counts = traffic.counts(), true.counts()
     assert counts
     assert true_counts

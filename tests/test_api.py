@@ -322,7 +322,7 @@ def test_follow_and_files_have_the_same_counts_vehicles_and_findings(
     from_file = vdet.count(tracks, settings)
     assert sum(total.count for total in from_file.totals) == 1
     assert from_file == results.counts
-    assert replace(from_file, doubts=()) == vdet.count(frames, settings)
+    assert replace(from_file, findings=()) == vdet.count(frames, settings)
     in_files = {name: json.loads(path.read_text()) for name, path in outputs.items()}
     totals = [total.count for total in from_file.totals]
     assert [item["count"] for item in in_files["counts"]["totals"]] == totals

@@ -18,7 +18,7 @@ ROOMS = (
     "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "run",
     "pages", "conditions", "traffic", "labels", "lanes", "track", "detect", "synthetic", "draw",
     "regions", "media", "config", "plugins", "workers", "files", "polygons", "boxes",
-    "errors", "progress", "__init__", "version",
+    "findings", "errors", "progress", "__init__", "version",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 

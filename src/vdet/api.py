@@ -28,7 +28,6 @@ from pathlib import Path
 import numpy as np
 
 from vdet.boxes import Box, Boxes, Image
-from vdet.conditions.finding import Finding
 from vdet.config.kinds import DetectorKind, TrackerKind, kind_of_model
 from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
@@ -39,6 +38,7 @@ from vdet.errors import ArgumentError, ArgumentTypeError, ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.files import OutputFiles
+from vdet.findings import Finding
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks
 from vdet.media import Frame, Picture

@@ -16,7 +16,7 @@ from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.run.result import FrameResult
+from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.track.track import Track, VideoTracker
 from vdet.traffic.live import LiveTraffic
@@ -131,7 +131,7 @@ def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails
                 traffic.add(result.frame_tracks)
                 sink.write(result)
             assert (picture.image == _IMAGE).all(), "the sink changed the frame"
-            traffic.end()
+            traffic.end(findings_in(context.facts))
             assert not _is_there(path), "the output exists before the run has ended"
             if fails:
                 raise KeyboardInterrupt

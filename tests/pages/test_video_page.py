@@ -16,8 +16,8 @@ from pages.html import Elements, needs_chromium, title_in_chromium
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
-from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
+from vdet.findings import Finding
 from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage

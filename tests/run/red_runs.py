@@ -8,17 +8,17 @@ from typing import Any
 
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
-from vdet.conditions.finding import Findings
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StageImages
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
+from vdet.findings import Findings
 from vdet.lanes.road import Road
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps, no_steps
 from vdet.run.loop import Parts, build, peek
-from vdet.run.result import CONDITIONS, FrameResult
+from vdet.run.result import FINDINGS, FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
 from vdet.run.video import Run, RunTotals, run_video
@@ -115,14 +115,14 @@ def write(
         context = SinkContext(
             files, settings, video, at=at, traffic=traffic, stage_images=stage_images
         )
-        context.facts[CONDITIONS] = findings or Findings()
+        context.facts[FINDINGS] = findings or Findings()
         with open_sinks([output], context) as sinks:
             for result in results:
                 if traffic:
                     traffic.add(result.frame_tracks)
                 sinks.write(result)
             if traffic:
-                traffic.end()
+                traffic.end(findings or Findings())
 
 
 def read(path: Path) -> list[Frame]:

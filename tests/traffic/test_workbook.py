@@ -11,6 +11,7 @@ import pytest
 
 from vdet.boxes import Image
 from vdet.config.schema import Settings
+from vdet.findings import Finding
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Corrected, Counts, Event
 from vdet.traffic.estimate import Estimate
@@ -76,7 +77,7 @@ def morning() -> dict[str, Counts]:
         600,
         event(5, "north", "out", 3, "car"),
         event(300, "east", "in", 4, "tractor"),
-        doubts=("the image is dark [dark]",),
+        findings=(Finding("dark", "the image is dark"),),
     )
     return {"07.jsonl": hour, "08.jsonl": rest}
 

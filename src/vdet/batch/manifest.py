@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 from vdet.errors import OutputError
 from vdet.files import lock, output_errors, remove_stale
-from vdet.run.result import CONDITIONS
+from vdet.run.result import FINDINGS
 from vdet.version import __version__
 
 MANIFEST = "manifest.jsonl"
@@ -103,7 +103,7 @@ class Record:
     @property
     def is_doubtful(self) -> bool:
         """Whether a result may be wrong."""
-        findings = self.facts.get(CONDITIONS, ())
+        findings = self.facts.get(FINDINGS, ())
         return any(finding["severity"] == "warning" for finding in findings)
 
     @property

@@ -11,6 +11,7 @@ from vdet.cli.messages import LOG, announce, print_lines, progress_steps
 from vdet.config.classes import OUR_NAMES, our_names
 from vdet.errors import DOUBTFUL, counted
 from vdet.files import OutputFiles, output_errors, write_text
+from vdet.findings import warnings_in
 
 if TYPE_CHECKING:
     from vdet.boxes import Image
@@ -107,7 +108,7 @@ def count(
     for name, result in videos.items():
         if result.corrected:
             print_lines(f"{name}: {result.corrected}")
-    is_doubtful = any(result.doubts for result in videos.values())
+    is_doubtful = any(warnings_in(result.findings) for result in videos.values())
     return DOUBTFUL if strict and is_doubtful else 0
 
 

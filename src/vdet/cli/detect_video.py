@@ -225,6 +225,7 @@ def _beside(source: Path) -> Path:
 
 def _process_video(run: "Run") -> bool:
     """Process a video, and return whether the result is doubtful."""
+    from vdet.findings import warnings_in
     from vdet.run.result import findings_in
     from vdet.run.sinks.protocol import STANDARD_OUTPUT
     from vdet.run.video import run_video
@@ -241,7 +242,7 @@ def _process_video(run: "Run") -> bool:
         announce(f"{run.source}: begins {totals.clock}")
     if totals.corrected:
         announce(f"{run.source}: {totals.corrected}")
-    return findings_in(totals.facts).is_doubtful
+    return bool(warnings_in(findings_in(totals.facts).items))
 
 
 def _process_videos(

@@ -11,8 +11,9 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float32Array, Float64Array, Image
-from vdet.conditions.finding import Finding, joined, when
 from vdet.errors import clock_text
+from vdet.findings import Finding
+from vdet.traffic.clock import joined, when
 
 _LIMIT = 0.01
 """Displacement of a camera that is not reported, as a fraction of the frame's width."""

@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Image
-from vdet.conditions.finding import Finding, joined, when
+from vdet.findings import Finding
 from vdet.polygons import Point
+from vdet.traffic.clock import joined, when
 
 _RATE = 8.0
 """Grey levels per second by which the background adapts."""

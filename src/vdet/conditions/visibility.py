@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float64Array, Image
-from vdet.conditions.finding import Finding, Severity, joined, when
 from vdet.config.schema import Code
+from vdet.findings import Finding, Severity
+from vdet.traffic.clock import joined, when
 
 Codes = npt.NDArray[np.str_]
 """Reasons for poor visibility, `(n,)`: keys of `WORDS`, empty where visibility is good."""

@@ -8,11 +8,11 @@ import numpy as np
 from vdet.boxes import Box, Boxes, Float64Array, Image
 from vdet.conditions import visibility
 from vdet.conditions.camera import CameraWatch
-from vdet.conditions.finding import Finding, Findings
 from vdet.conditions.motion import MotionWatch
 from vdet.conditions.weak import WeakWatch
 from vdet.config.schema import Settings
 from vdet.detect.onnx.water import is_wet
+from vdet.findings import Finding, Findings
 from vdet.media import Picture
 from vdet.track.track import Track
 

@@ -12,9 +12,10 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from vdet.boxes import EDGE, Box, Boxes, Float64Array, coverage, iou_matrix
-from vdet.conditions.finding import Finding, joined, when
+from vdet.findings import Finding
 from vdet.media import Picture
 from vdet.track.track import Track
+from vdet.traffic.clock import joined, when
 
 _MIN_SCORE = 0.1
 """Minimum score of a detection."""

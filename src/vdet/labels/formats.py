@@ -4,15 +4,16 @@ Formats are registered in the group `vdet.formats`: see `vdet.plugins`.
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import OutputError, TruthError
-from vdet.labels.label import SavedFinding, SavedTracks, Size, SourceVideo
+from vdet.findings import Finding
+from vdet.labels.label import SavedTracks, Size, SourceVideo
 from vdet.labels.parsing import numbered_lines
 from vdet.plugins import FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks, Track
@@ -85,14 +86,13 @@ class TrackWriter:
             frame = replace(frame, facts={VIDEO: values, **frame.facts})
         self._last = frame
 
-    def end(self, findings: Sequence[Mapping[str, Any]] = ()) -> None:
+    def end(self, findings: tuple[Finding, ...] = ()) -> None:
         """Write everything that is left, with the findings. Not called after an error."""
         if self._form.whole:
-            saved = tuple(SavedFinding(**finding) for finding in findings)
-            self._form.whole(self._file, replace(self._video, findings=saved), self._kept)
+            self._form.whole(self._file, replace(self._video, findings=findings), self._kept)
         elif self._last:
-            facts = {**self._last.facts, FINDINGS: findings} if findings else self._last.facts
-            self._write_lines(replace(self._last, facts=facts))
+            said = {FINDINGS: [finding.record() for finding in findings]} if findings else {}
+            self._write_lines(replace(self._last, facts={**self._last.facts, **said}))
 
     def _write_lines(self, frame: FrameTracks) -> None:
         assert self._form.lines

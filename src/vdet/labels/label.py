@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pydantic
@@ -18,6 +18,7 @@ from pydantic import AwareDatetime, Field, TypeAdapter
 from vdet.boxes import Box, Float64Array
 from vdet.config.classes import our_name
 from vdet.errors import TruthError
+from vdet.findings import Finding
 from vdet.track.track import FrameTracks, State, Track
 
 NO_ID = -1
@@ -117,17 +118,6 @@ def mistake_in_box(label: Label) -> str | None:
 
 
 @pydantic.dataclasses.dataclass(frozen=True, slots=True)
-class SavedFinding:
-    """A reason to doubt tracks: see `vdet.conditions.finding.Finding`."""
-
-    code: str
-    severity: Literal["warning", "note"]
-    text: str
-    times: tuple[tuple[float, float], ...] = ()
-    value: float | None = None
-
-
-@pydantic.dataclasses.dataclass(frozen=True, slots=True)
 class SourceVideo:
     """What a file of tracks says of its video.
 
@@ -162,14 +152,15 @@ class SourceVideo:
     classes: tuple[str, ...] = ()
     program: str = ""
     settings: dict[str, Any] = Field(default_factory=dict)
-    findings: tuple[SavedFinding, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     def record(self) -> dict[str, Any]:
         """Return it as values for JSON, without what is unknown."""
         values: dict[str, Any] = TypeAdapter(SourceVideo).dump_python(
-            self, mode="json", exclude_defaults=True
+            self, mode="json", exclude_defaults=True, exclude={"findings"}
         )
-        return values
+        records = [finding.record() for finding in self.findings]
+        return {**values, "findings": records} if records else values
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,15 +195,19 @@ class SavedTracks:
     video: SourceVideo | None = None
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """A sentence for each reason to doubt the tracks."""
-        findings = self.video.findings if self.video else ()
-        return tuple(f"{f.text} [{f.code}]" for f in findings if f.severity == "warning")
+    def findings(self) -> tuple[Finding, ...]:
+        """Reasons to doubt the tracks."""
+        return self.video.findings if self.video else ()
 
     @property
     def has_times(self) -> bool:
         """Whether every frame has a time; if not, pass a rate to `at_rate`."""
         return self._indices() <= self.times.keys()
+
+    @property
+    def first_time(self) -> float:
+        """Time of the first frame, seconds; 0 if there is none."""
+        return min(self.times.values(), default=0.0)
 
     def of_video(self, video: SourceVideo) -> "SavedTracks":
         """Return the same tracks with what the file says of their video."""

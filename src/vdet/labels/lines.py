@@ -21,8 +21,9 @@ from pydantic.dataclasses import dataclass
 
 from vdet.config.camera import parse_date_time
 from vdet.errors import TruthError
+from vdet.findings import Finding
 from vdet.labels.formats import VIDEO, Format
-from vdet.labels.label import Label, SavedFinding, SavedTracks, SourceVideo, from_size, line_error
+from vdet.labels.label import Label, SavedTracks, SourceVideo, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -98,7 +99,7 @@ class _Record:
     tracks: Annotated[list[_Box], FailFast()]
     clock: str | None = None
     video: SourceVideo | None = None  # of the first frame
-    findings: tuple[SavedFinding, ...] = ()  # of the last frame
+    findings: tuple[Finding, ...] = ()  # of the last frame
 
 
 _ROW, _RECORD = TypeAdapter(_Row), TypeAdapter(_Record)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from vdet.errors import TruthError
 from vdet.files import is_hidden
+from vdet.findings import warnings_in
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images
@@ -54,8 +55,8 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
         (width, height), (expected_width, expected_height) = saved.size, size
         fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
         raise TruthError(f"{path}: {fault}")
-    for doubt in saved.doubts:
-        _log.warning("%s: %s", path, doubt)
+    for finding in warnings_in(saved.findings):
+        _log.warning("%s: %s", path, finding)
     return saved if rate is None else saved.at_rate(rate)
 
 

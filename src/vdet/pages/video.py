@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from vdet.boxes import Image
-from vdet.conditions.finding import Finding
 from vdet.config.classes import UNKNOWN
 from vdet.draw.boxes import color_of, text_color
 from vdet.errors import named
+from vdet.findings import Finding
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 import cv2
 
 from vdet.boxes import Boxes
-from vdet.conditions.finding import Findings
 from vdet.config.classes import is_chosen
+from vdet.findings import Findings
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
 
@@ -31,13 +31,13 @@ class Fact(Protocol):
 Facts = Mapping[str, Fact]
 """Facts by their names, which are their keys in JSON."""
 
-CONDITIONS = "conditions"
+FINDINGS = "conditions"
 """Name of the fact that has the reasons to doubt the results of a video."""
 
 
 def findings_in(facts: Facts) -> Findings:
     """Return the reasons to doubt the results of a video."""
-    return cast("Findings", facts.get(CONDITIONS, Findings()))
+    return cast("Findings", facts.get(FINDINGS, Findings()))
 
 
 @dataclass(frozen=True)

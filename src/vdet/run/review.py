@@ -46,6 +46,6 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
                 count += 1
             if not count:
                 raise VideoError(f"{run.source}: no frames at these times; check them")
-            traffic.end()
+            traffic.end(findings_in(context.facts))
         for warning in str(findings_in(context.facts)).splitlines():
             log.warning("%s: %s", run.source, warning)

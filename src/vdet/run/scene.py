@@ -105,13 +105,12 @@ def saved_frames(
         log.warning("%s: is of %s, not %s", tracks, saved.video.name, run.source.name)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    frames = list(saved)
-    origin = float(video.start) if video else next((frame.time for frame in frames), 0.0)
+    origin = float(video.start) if video else saved.first_time
     start = origin + float(run.start or 0)
     end = math.inf if run.end is None else origin + float(run.end)
     regions = Regions(run.settings.regions, *size)
     return [
         replace(frame, tracks=tracks_inside(regions, frame.tracks))
-        for frame in frames
+        for frame in saved
         if start <= frame.time < end
     ]

@@ -16,7 +16,7 @@ from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
 from vdet.polygons import Point
 from vdet.regions import Regions
-from vdet.run.result import CONDITIONS, Facts, FrameResult
+from vdet.run.result import FINDINGS, Facts, FrameResult
 from vdet.track.track import Track
 
 if TYPE_CHECKING:  # what an image does not need is loaded where it is used
@@ -178,7 +178,7 @@ class ConditionStep:
 
     def finish(self) -> Facts:
         """Return the findings about the video."""
-        return {CONDITIONS: self._conditions.findings()}
+        return {FINDINGS: self._conditions.findings()}
 
 
 class StandingStep:

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import NO_BOXES
-from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model, load_detector
 from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import FileIds, OutputFiles
+from vdet.findings import Finding
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps, no_steps
 from vdet.run.inputs import input_files
@@ -180,8 +180,7 @@ def open_video(
                     yield result.of_classes(settings.classes)
             facts.update(pipeline.facts())
             if with_traffic:
-                findings = findings_in(facts)
-                traffic.end(is_still=findings.is_still, doubts=tuple(str(findings).splitlines()))
+                traffic.end(findings_in(facts))
 
         with closing(results()) as every_result:
             yield OpenVideo(reader, pipeline.detector, every_result, traffic, facts)

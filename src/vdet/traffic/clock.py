@@ -1,7 +1,7 @@
 """The clock of a video and its source, and the intervals of tables and pages."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from vdet.config.camera import parse_date_time
 from vdet.config.schema import Settings
-from vdet.errors import ConfigError
+from vdet.errors import ConfigError, clock_text
 from vdet.media.frame import Tags
 from vdet.media.images import numbered_images
 from vdet.track.track import FrameTracks
@@ -175,6 +175,8 @@ Span = tuple[float, float]
 ClockTime = datetime | float | None
 """A clock time; without a clock, seconds in the video; None for several videos without one."""
 
+_GAP = 2.0
+"""Maximum seconds between two times of one span, in `joined`."""
 _LONGEST_FRAME = 60.0
 """Maximum duration of a frame, seconds; a later next frame means a part without video."""
 
@@ -195,6 +197,21 @@ def extend(spans: list[Span], time: float, gap: float | None) -> None:
         spans[-1] = spans[-1][0], time
     else:
         spans.append((time, time))
+
+
+def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
+    """Join ascending times that are close together into spans; omit spans that are too short."""
+    spans: list[Span] = []
+    for time in times:
+        extend(spans, time, _GAP)
+    return [(first, last) for first, last in spans if last - first >= shortest]
+
+
+def when(spans: Sequence[Span]) -> str:
+    """Return "from 0:05 to 0:32"; for several spans, the longest and the number of others."""
+    first, last = max(spans, key=lambda span: span[1] - span[0])
+    more = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
+    return f"from {clock_text(int(first))} to {clock_text(int(last))}{more}"
 
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
+from vdet.findings import Finding
 from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_tracks
 from vdet.lanes.ground import ground_of
@@ -107,8 +108,8 @@ def count_files(
         if clock and settings.input.begin and len(paths) > 1:
             clock = recording.next_clock(path, saved, clock, group.last if group else None)
         frame_size = _frame_size(settings, size or saved.size)
-        first, is_complete = min(saved.times.values(), default=0.0), saved.covered is not None
-        video = _Video(str(path), clock, first, is_complete, saved.doubts)
+        first, is_complete = saved.first_time, saved.covered is not None
+        video = _Video(str(path), clock, first, is_complete, saved.findings)
         if group is None or not group.precedes(video, frame_size):
             counted |= group.counts() if group else {}
             started = group.counter.linker.started if group else 0
@@ -168,7 +169,7 @@ class _Video:
         Times of its first frame, and from which on frames count.
     is_complete
         Whether its last frame is known, also without a vehicle.
-    doubts
+    findings
         As in `Counts`.
     shift, frame_shift
         What converts its times and the numbers of its frames to those of the group.
@@ -184,7 +185,7 @@ class _Video:
     clock: Clock | None = None
     first: float = 0.0
     is_complete: bool = True
-    doubts: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     meter: SpeedMeter | None = None
     start: float = -math.inf
     shift: float = 0.0
@@ -207,7 +208,7 @@ class _Video:
         )
         spans = self.spans or ((self.first, self.first),)
         of_video = replace(
-            group, events=tuple(events), spans=spans, clock=self.clock, doubts=self.doubts
+            group, events=tuple(events), spans=spans, clock=self.clock, findings=self.findings
         )
         return with_speeds(of_video, self.meter)
 

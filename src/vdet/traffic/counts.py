@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from vdet.config.classes import UNKNOWN
 from vdet.errors import ArgumentError, counted, needing
+from vdet.findings import Finding, warnings_in
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
 from vdet.traffic.estimate import Estimate
@@ -223,8 +224,8 @@ class Counts:
         None if unknown.
     warnings
         A sentence for each misplaced line, a low frame rate, and impossible lengths of cars.
-    doubts
-        A sentence for each reason to doubt the tracks.
+    findings
+        Reasons to doubt the tracks.
     corrected
         What a reviewer corrected; None if nothing was.
     outside_flows
@@ -241,11 +242,16 @@ class Counts:
     spans: tuple[Span, ...] = ((0.0, 0.0),)
     clock: Clock | None = None
     warnings: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     corrected: Corrected | None = None
     traces: "tuple[Trace, ...]" = ()
     outside_flows: tuple[str, ...] = ()
     classes: tuple[str, ...] = ()
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """A sentence for each reason to doubt the counts."""
+        return (*map(str, warnings_in(self.findings)), *self.warnings)
 
     @property
     def flow_names(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
+from vdet.findings import Findings
 from vdet.lanes.ground import ground_of
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
@@ -79,14 +80,14 @@ class LiveTraffic:
         if self._final:
             self._final = replace(self._final, traces=tuple(traces))
 
-    def end(self, *, is_still: bool = False, doubts: tuple[str, ...] = ()) -> None:
+    def end(self, findings: Findings) -> None:
         """Make records and counts, after the last frame.
 
-        `is_still` as for `VehicleRecords.end`, `doubts` as in `Counts`.
+        `findings` are about the tracks.
         """
-        records = self._records.end(self.speeds, is_still=is_still)
+        records = self._records.end(self.speeds, is_still=findings.is_still)
         if counts := self.counts():
-            self._final = counts = replace(counts, doubts=doubts)
+            self._final = counts = replace(counts, findings=findings.items)
             if self._corrections:
                 self._final = self._corrections.apply(counts, self._classes)
                 _correct(records, counts, self._final)

@@ -110,7 +110,7 @@ class Survey:
         survey, whole = self.settings.survey, self._whole
         files = counted(len(self.videos), "file")
         checked = sum(counts.corrected is not None for counts in self.counts)
-        doubts = sum(len(counts.doubts + counts.warnings) for counts in self.counts)
+        doubts = sum(len(counts.doubts) for counts in self.counts)
         clocks = dict.fromkeys(counts.clock.source for counts in self.counts if counts.clock)
         times = (time for time in (whole.start, whole.end) if isinstance(time, datetime))
         zones = dict.fromkeys(f"UTC{time.isoformat()[-6:]}" for time in times)
@@ -233,9 +233,9 @@ class Survey:
         for name, counts in self.videos.items():
             period = Intervals([(counts.clock, counts.spans)], None).periods[0]
             clock = counts.clock.source if counts.clock else "unknown"
-            doubts = len(counts.doubts + counts.warnings)
             times = [_time(period.start), _time(period.end), period.observed]
-            rows.append([name, *times, _seam(before, period), clock, len(counts.events), doubts])
+            numbers = len(counts.events), len(counts.doubts)
+            rows.append([name, *times, _seam(before, period), clock, *numbers])
             before = period
         headings = "file", "first frame", "last frame", "observed, s", "after the file before"
         return SheetTable([*headings, "clock", "events", "doubts"], rows)
@@ -254,9 +254,7 @@ class Survey:
     def notes(self) -> SheetTable:
         """Return the warnings and doubts of each file, and what the sheets mean."""
         rows: list[list[Cell]] = [
-            [name, text]
-            for name, counts in self.videos.items()
-            for text in (*counts.doubts, *counts.warnings)
+            [name, text] for name, counts in self.videos.items() for text in counts.doubts
         ]
         units = [f"{name} {number:g}" for name, number in self.settings.traffic.pcu.items()]
         rows += [["", text] for text in _NOTES.splitlines()]

@@ -5,7 +5,7 @@ vehicles. What differs where vehicles drive, and is as large and lasts as long a
 vehicles there, is a trace. It is a hint: nothing is counted by it.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass
 from functools import reduce
@@ -14,7 +14,10 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
+from vdet.errors import clock_text, counted
+from vdet.findings import Finding
 from vdet.track.track import FrameTracks
+from vdet.traffic.counts import Counts
 from vdet.traffic.strips import Band, Passage
 
 _SAMPLES = 64
@@ -39,6 +42,10 @@ _ENOUGH, _LATEST = 2, 100
 """Minimum number of tracked vehicles that crossed, and number of the latest ones in use."""
 _DELAY = 4.0
 """Seconds after which a trace is complete."""
+_MANY = 0.05
+"""Maximum number of traces for a note instead of a warning, as a fraction of the vehicles."""
+_INTERVAL = 300
+"""Seconds of the intervals in which traces are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,3 +205,22 @@ def _median(values: Float32Array, is_valid: BoolArray, axis: int) -> Float32Arra
     masked = np.ma.array(values, mask=np.broadcast_to(~is_valid, values.shape))
     median = np.ma.median(masked, axis=axis, keepdims=True)  # type: ignore[no-untyped-call]
     return np.asarray(median.filled(0), np.float32)
+
+
+def trace_findings(counts: Counts) -> tuple[Finding, ...]:
+    """Return a finding for each line or zone with traces; a single trace is a note."""
+    vehicles = Counter(event.name for event in counts.events)
+    findings = []
+    for name, number in Counter(trace.name for trace in counts.traces).items():
+        times = [trace.time for trace in counts.traces if trace.name == name]
+        starts = Counter(int(time // _INTERVAL) * _INTERVAL for time in times)
+        [(start, most)] = starts.most_common(1)
+        text = (
+            f"{name}: {counted(number, 'trace')} without a vehicle, and {vehicles[name]} counted; "
+            f"{clock_text(start)} to {clock_text(start + _INTERVAL)}: {most}"
+        )
+        fraction = number / max(1, vehicles[name])
+        is_many = number > 1 and fraction > _MANY
+        spans = tuple((time, time) for time in times)
+        findings.append(Finding("traces", text, spans, "warning" if is_many else "note", fraction))
+    return tuple(findings)

@@ -12,9 +12,9 @@ from red_cars import SETTINGS
 from run.conftest import Register
 from run.red_runs import COUNT, outputs, read, run_red, video_info
 from vdet.boxes import Image
-from vdet.conditions.finding import Findings
 from vdet.errors import OutputError
 from vdet.files import OutputFiles
+from vdet.findings import Findings
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind, check_sinks, open_sinks

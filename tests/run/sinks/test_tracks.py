@@ -14,8 +14,8 @@ import pytest
 from red_cars import SETTINGS
 from run.red_runs import result_of, write
 from vdet.boxes import Box
-from vdet.conditions.finding import Finding, Findings
 from vdet.config.schema import LaneSettings
+from vdet.findings import Finding, Findings
 from vdet.labels.reading import read_tracks
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture

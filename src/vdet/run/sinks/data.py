@@ -65,7 +65,7 @@ class TrackSink(BaseSink):
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with self._file or nullcontext():
             if kind is None:
-                self._writer.end(findings_in(self.context.facts).record())
+                self._writer.end(findings_in(self.context.facts).items)
         if self._file is None:
             sys.stdout.flush()
 

@@ -10,14 +10,13 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.conditions.traces import trace_findings
 from vdet.errors import OutputError
 from vdet.media import Picture
 from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
 from vdet.pages.batch import write_reviews
 from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, crop_name, write_review
-from vdet.run.result import CONDITIONS, FrameResult, findings_in
+from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Event
@@ -31,7 +30,7 @@ from vdet.traffic.strips import (
     layers_of,
     sampling_of,
 )
-from vdet.traffic.traces import Trace, TraceSearch
+from vdet.traffic.traces import Trace, TraceSearch, trace_findings
 
 _MINUTE = 60
 _ENOUGH = 6
@@ -204,7 +203,7 @@ class ReviewSink(BaseSink):
         self.traffic.add_traces(sorted(self._traces, key=lambda trace: trace.time))
         counts, findings = self.traffic.counts(), findings_in(facts)
         if counts and "traces" not in ignored:
-            facts[CONDITIONS] = replace(findings, items=findings.items + trace_findings(counts))
+            facts[FINDINGS] = replace(findings, items=findings.items + trace_findings(counts))
 
     def _marks(self, events: Sequence[Event]) -> list[Mark]:
         """Return where the counted events are."""

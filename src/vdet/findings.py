@@ -1,21 +1,18 @@
-"""A finding: a reason to doubt a result, when it applies, and how much."""
+"""Findings: reasons to doubt a result, when they apply, and how much."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from vdet.config.schema import Code
-from vdet.errors import clock_text
-from vdet.traffic.clock import Span, extend
+import pydantic
+from pydantic import AliasChoices, Field
 
 Severity = Literal["warning", "note"]
-_GAP = 2.0
-"""Maximum seconds between two times of one span."""
 
 
-@dataclass(frozen=True, slots=True)
+@pydantic.dataclasses.dataclass(frozen=True, slots=True)
 class Finding:
-    """A reason to doubt a result.
+    """A reason to doubt a result, also as a file of tracks says it.
 
     Attributes
     ----------
@@ -32,11 +29,16 @@ class Finding:
         that the network finds.
     """
 
-    code: Code
+    code: str
     text: str
-    spans: tuple[Span, ...] = ()
+    spans: tuple[tuple[float, float], ...] = Field(
+        default=(), validation_alias=AliasChoices("times", "spans")
+    )
     severity: Severity = "warning"
     value: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.text} [{self.code}]"
 
     def record(self) -> dict[str, Any]:
         """Return it as values for JSON; times are rounded to milliseconds."""
@@ -44,6 +46,11 @@ class Finding:
         value = None if self.value is None else round(self.value, 3)
         values = {"code": self.code, "severity": self.severity, "text": self.text}
         return values | {"times": times, "value": value}
+
+
+def warnings_in(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return those by which a result may be wrong."""
+    return tuple(finding for finding in findings if finding.severity == "warning")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,30 +68,9 @@ class Findings:
     items: tuple[Finding, ...] = ()
     is_still: bool = False
 
-    @property
-    def is_doubtful(self) -> bool:
-        """Whether a result may be wrong."""
-        return any(finding.severity == "warning" for finding in self.items)
-
     def record(self) -> list[dict[str, Any]]:
         """Return them as values for JSON."""
         return [finding.record() for finding in self.items]
 
     def __str__(self) -> str:
-        warnings = (finding for finding in self.items if finding.severity == "warning")
-        return "\n".join(f"{finding.text} [{finding.code}]" for finding in warnings)
-
-
-def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
-    """Join ascending times that are close together into spans; omit spans that are too short."""
-    spans: list[Span] = []
-    for time in times:
-        extend(spans, time, _GAP)
-    return [(first, last) for first, last in spans if last - first >= shortest]
-
-
-def when(spans: Sequence[Span]) -> str:
-    """Return "from 0:05 to 0:32"; for several spans, the longest and the number of others."""
-    first, last = max(spans, key=lambda span: span[1] - span[0])
-    more = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
-    return f"from {clock_text(int(first))} to {clock_text(int(last))}{more}"
+        return "\n".join(map(str, warnings_in(self.items)))
