@@ -37,7 +37,7 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ArgumentError, ArgumentTypeError, ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
-from vdet.files import OutputFiles
+from vdet.files import OutputFiles, valid_text
 from vdet.findings import Finding
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks
@@ -369,7 +369,7 @@ def count(
         size = size or (first.frame.picture.width, first.frame.picture.height)
     items = frames if first is None else chain([first], frames)
     shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in items)
-    name = first.source.name if isinstance(first, FrameResult) else None
+    name = valid_text(first.source.name) if isinstance(first, FrameResult) else None
     return count_frames(shown, settings, size, corrections=reviews, name=name)
 
 

@@ -350,8 +350,13 @@ def is_hidden(name: PurePath) -> bool:
     return any(part.startswith((".", "__MACOSX")) for part in name.parts)
 
 
+def valid_text(text: str) -> str:
+    """Return text that UTF-8 can hold; what is invalid, as in some file names, is escaped."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8; invalid text, such as undecodable file names, is escaped."""
+    """Write `valid_text` as UTF-8."""
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from conftest import Run
 from running import rows_of, write_drive
+from vdet.labels.reading import read_tracks
 from vdet.media.images import encode_image
 
 LINES = """
@@ -52,6 +53,21 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
     if form != "txt":
         result = run("count", tracks, *lines, "--rate", "25")
         assert "--rate changes nothing: the tracks have times; remove it" in result.err
+
+
+@pytest.mark.parametrize("form", ["jsonl", "coco.json"])
+def test_tracks_of_a_video_whose_name_is_not_utf8_can_be_counted(
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...], form: str
+) -> None:
+    clip, tracks, fixes = tmp_path / "caf\udce9.mp4", tmp_path / f"t.{form}", tmp_path / "fixes.yaml"
+    clip.write_bytes((folder / "red.mp4").read_bytes())
+    lines = ("-c", folder / "lines.yaml")
+    run("detect-video", clip, "--no-video", "--tracks", tracks, *red, code=0)
+    assert read_tracks(tracks).video.name == r"caf\udce9.mp4"
+    fixes.write_text("{video: 'caf\\udce9.mp4', size: [320, 240]}")
+    run("count", tracks, "--corrections", fixes, *lines, code=0)
+    wanted = ("--no-video", "--counts", tmp_path / "c.json", "--corrections", fixes)
+    run("detect-video", clip, *wanted, *red, *lines, code=0)
 
 
 def test_doubts_and_the_size_of_the_frames_are_those_of_the_tracks(

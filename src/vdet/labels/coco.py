@@ -27,6 +27,7 @@ from pydantic.dataclasses import dataclass
 from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError
+from vdet.files import valid_text
 from vdet.labels.formats import Format, ImageTracks, last_classes
 from vdet.labels.images import LabelledImage, image_names, inside
 from vdet.labels.label import NO_ID, Label, SavedTracks, Size, SourceVideo, from_size, line_error
@@ -109,7 +110,7 @@ def write_coco_images(file: BinaryIO, images: Sequence[ImageTracks]) -> None:
     """Write the vehicles in images; their paths are their names in the file."""
     writer = _Writer("images")
     for number, image in enumerate(images, start=1):
-        (width, height), name = image.size, image.path.as_posix()
+        (width, height), name = image.size, valid_text(image.path.as_posix())
         writer.add("images", id=number, file_name=name, width=width, height=height)
         for track in image.tracks:
             category = writer.category(track.class_name or UNKNOWN)

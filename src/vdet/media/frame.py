@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Box, Float64Array, Image
+from vdet.files import valid_text
 from vdet.media.images import Orientation, from_16_bits, to_ycrcb
 
 if TYPE_CHECKING:  # an image needs no PyAV
@@ -339,3 +340,8 @@ class VideoInfo:
     coding: Coding = field(default_factory=Coding)
     has_audio: bool = False
     tags: Tags = Tags()
+
+    @property
+    def name(self) -> str:
+        """The name of the file, as outputs have it."""
+        return valid_text(self.path.name)

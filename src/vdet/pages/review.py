@@ -90,7 +90,7 @@ class Review:
     @property
     def key(self) -> str:
         """The key of what was checked in the storage of the browser."""
-        return f"vdet review {self.video.path.name} {self.written}"
+        return f"vdet review {self.video.name} {self.written}"
 
     def data(self) -> dict[str, Any]:
         """Return the values for the script of the page."""
@@ -115,7 +115,7 @@ class Review:
         ]
         unlisted = {class_of(mark.event) for mark in self.marks} - set(OUR_NAMES)
         return {
-            "video": video.path.name,
+            "video": video.name,
             "size": [video.width, video.height],
             "start": float(video.start),
             "key": self.key,
@@ -140,7 +140,7 @@ class Review:
         marks = Counter((class_of(mark.event), mark.minute) for mark in self.marks)
         traffic = Counter(mark.minute for mark in self.marks)
         numbers = [traffic[minute] for minute in minutes]
-        seed = crc32(self.video.path.name.encode("utf-8", "surrogateescape"))
+        seed = crc32(self.video.name.encode())
         return {
             "minutes": minutes,
             "counted": {
@@ -156,7 +156,7 @@ class Review:
 def write_review(file: TextIO, review: Review, folder: Path) -> None:
     """Write the page. `folder` has its pictures, WebP files; a vehicle may have none."""
     scripts = [Markup((TEMPLATES / name).read_text("utf-8")) for name in _SCRIPTS]
-    page = render("review.html", data=review.data(), scripts=scripts, name=review.video.path.name)
+    page = render("review.html", data=review.data(), scripts=scripts, name=review.video.name)
     before, _, after = page.partition(_PICTURES)
     file.write(before)
     crops = {crop_name(mark.event.id) for mark in review.marks}

@@ -101,8 +101,8 @@ def saved_frames(
     one of the video. Raises `TruthError`, also if the tracks are of frames of another size.
     """
     saved = read_tracks(tracks, float(video.rate) if video else None, size)
-    if video and saved.video and saved.video.name != run.source.name:
-        log.warning("%s: is of %s, not %s", tracks, saved.video.name, run.source.name)
+    if video and saved.video and saved.video.name != video.name:
+        log.warning("%s: is of %s, not %s", tracks, saved.video.name, video.name)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
     origin = float(video.start) if video else saved.first_time

@@ -14,7 +14,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import as_model, load_detector
 from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
-from vdet.files import FileIds, OutputFiles
+from vdet.files import FileIds, OutputFiles, valid_text
 from vdet.findings import Finding
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps, no_steps
@@ -154,7 +154,7 @@ def open_video(
     if run.corrections:  # most runs have none, and load nothing for them
         from vdet.traffic.corrections import by_video, read_corrections
 
-        name, reviews = run.source.name, read_corrections(run.corrections)
+        name, reviews = valid_text(run.source.name), read_corrections(run.corrections)
         corrections = by_video(reviews, {name: name}, run.settings.traffic)[name]
     with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, read):
         images, frames = peek(read)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.errors import TruthError, needing
-from vdet.files import json_text, write_text
+from vdet.files import json_text, valid_text, write_text
 
 SUFFIXES = (".csv", ".json", ".parquet")
 
@@ -74,8 +74,8 @@ def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[A
     arrays = {}
     for number, name in enumerate(columns):
         column = [row[number] for row in rows]
-        if name in _TEXTS:  # the name of a video may be invalid text
-            column = [text and text.encode(errors="backslashreplace").decode() for text in column]
+        if name in _TEXTS:
+            column = [text and valid_text(text) for text in column]
         kind = pa.string() if name in _TEXTS else pa.int64() if name in _INTEGERS else pa.float64()
         arrays[name] = pa.array(column, kind)
     parquet.write_table(pa.table(arrays), path)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Image
+from vdet.files import valid_text
 from vdet.media.images import encode_image
 
 Cell = str | float | datetime | timedelta | None
@@ -100,10 +101,10 @@ class _SheetWriter:
 
     def _table(self, table: SheetTable) -> None:
         if table.title:
-            self._page.write_string(self._row, 0, _valid(table.title), self._style(**_TITLE))
+            self._page.write_string(self._row, 0, valid_text(table.title), self._style(**_TITLE))
             self._row += 1
         for column, heading in enumerate(table.headings):
-            self._page.write_string(self._row, column, _valid(heading), self._style(**_HEADING))
+            self._page.write_string(self._row, column, valid_text(heading), self._style(**_HEADING))
             self._widen(column, max(map(len, heading.split())))
         self._row += bool(table.headings)
         for row in table.rows:
@@ -119,7 +120,7 @@ class _SheetWriter:
         match cell:
             case str():
                 wrap = len(cell) > _WIDEST
-                self._page.write_string(*at, _valid(cell), self._style(text_wrap=wrap))
+                self._page.write_string(*at, valid_text(cell), self._style(text_wrap=wrap))
                 self._widen(column, len(cell))
             case datetime():
                 time, style = cell.replace(tzinfo=None), self._style(num_format=_CLOCK, **left)
@@ -134,8 +135,3 @@ class _SheetWriter:
 
     def _widen(self, column: int, width: int) -> None:
         self._widths[column] = max(self._widths[column], width)
-
-
-def _valid(text: str) -> str:
-    """Return text without the parts of a file name that are no text."""
-    return text.encode(errors="backslashreplace").decode()

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 from vdet.errors import OutputError
-from vdet.files import json_text, print_now, write_text
+from vdet.files import json_text, print_now, valid_text, write_text
 from vdet.labels.coco import COCO, write_coco_images
 from vdet.labels.formats import (
     ImageTracks,
@@ -71,12 +71,12 @@ class TrackSink(BaseSink):
 
     def _source(self) -> SourceVideo:
         video, clock, context = self.video, self.traffic.clock, self.context
-        settings = context.settings.with_paths(lambda path: Path(path).name)
+        settings = context.settings.with_paths(lambda path: valid_text(Path(path).name))
         values = settings.model_dump(mode="json", exclude_defaults=True)
         for name, section in (("detector", settings.detector), ("tracker", settings.tracker)):
             values[name] = {"kind": section.kind, **values.get(name, {})}
         return SourceVideo(
-            name=video.path.name,
+            name=video.name,
             width=video.width,
             height=video.height,
             rate=round(float(video.rate), 6),
@@ -159,7 +159,7 @@ class JsonSink(BaseSink):
         picture, boxes = result.frame.picture, list(map(track_record, result.tracks))
         for box in boxes:
             del box["id"], box["state"]  # they mean nothing in a single image
-        item = {"image": str(result.source), "width": picture.width, "height": picture.height}
+        item = {"image": valid_text(str(result.source)), "width": picture.width, "height": picture.height}
         self._items.append({**item, "boxes": boxes, **result.frame_tracks.facts})
 
 
@@ -224,7 +224,7 @@ class WorkbookSink(BaseSink):
         assert image is not None  # a run has frames
         paths = {vehicle.id: vehicle.path for vehicle in self.traffic.vehicles}
         picture = scene_picture(image, settings.traffic, [counts], paths)
-        survey = Survey({self.video.path.name: counts}, settings)
+        survey = Survey({self.video.name: counts}, settings)
         write_workbook(self.context.files.stage(self.path), survey.sheets(picture))
 
 
@@ -243,7 +243,7 @@ def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> BaseSink
     def content(sink: TableSink) -> Any:
         counts = sink.traffic.counts()
         assert counts  # the settings have lines or zones
-        return make(path, {sink.video.path.name: counts}, traffic.seconds)
+        return make(path, {sink.video.name: counts}, traffic.seconds)
 
     return TableSink(content, path, context)
 

@@ -174,7 +174,7 @@ class PageSink(BaseSink):
             poster=self._poster.image(traffic.vehicles),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
-            survey=Survey({self.video.path.name: counts}, settings) if counts else None,
+            survey=Survey({self.video.name: counts}, settings) if counts else None,
             interval=settings.traffic.seconds or 60,
             clock=traffic.clock,
             pictures=self._pictures(),
