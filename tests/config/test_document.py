@@ -69,6 +69,7 @@ def test_every_key_has_the_place_where_it_or_the_nearest_thing_around_it_stands(
         ("a: .5e1", {"a": 5.0}),
         ("a: yes", {"a": "yes"}),
         ("a: ~", {"a": None}),
+        ("a: ['0550', 0, 0.5, 0x1F]", {"a": ["0550", 0, 0.5, 31]}),
         ("1: a\ntrue: b\n<<: {c: 1}", {"1": "a", "true": "b", "<<": {"c": 1}}),
     ],
 )
@@ -88,6 +89,21 @@ def test_scalars_are_those_of_yaml_with_exponents_and_all_keys_are_text(
         ("{a: 1}: 2", "1:1: is not YAML: a mapping cannot be a key"),
         ("a: 2001-99-99", "1:4: is not YAML: month must be in 1..12"),
         ("a: [1, 2", "1:9: is not YAML: "),
+        *(
+            (
+                f"a: [0, {number}]",
+                f"1:8: is not YAML: {number} is octal in YAML, as it begins with 0",
+            )
+            for number in ("0550", "-010", "08", "00")
+        ),
+        *(
+            (
+                f"a: {text}",
+                f"1:4: is not YAML: found character '{text[0]}' that cannot start any "
+                "token; quote the text",
+            )
+            for text in ("%Y%m%d", "@gate", "`x`")
+        ),
         ("a: 1\n b: 2", "2:3: is not YAML: mapping values are not allowed here"),
         ("--- 1\n--- 2", "2:1: is not YAML: but found another document"),
         ("%YAML 9.9\n---\na: 1", "1:1: is not YAML: found incompatible YAML document"),
@@ -128,7 +144,7 @@ def test_an_assignment_is_a_document_of_one_key(text: str, values: object) -> No
             for text in ("", "heat.frames", "=3", "heat..frames=3", ".a=1")
         ),
         ("heat=[", "--set:1:2: is not YAML"),
-        ("heat=*x", "--set:1:1: is not YAML: aliases"),
+        ("heat=*x", "--set:1:1: is not YAML: aliases (*name) are not accepted; quote"),
         ("heat={a: 1, a: 2}", "--set:1:8: is not YAML: a appears twice"),
         ("heat=\ud800", "--set: is not YAML: unacceptable character"),
     ],

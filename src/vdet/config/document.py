@@ -17,6 +17,8 @@ MAX_BYTES = 100_000
 """Ten times the size of all settings with all their comments."""
 
 _WORDS = ("yes", "no", "on", "off")
+_LEADING_ZERO = re.compile(r"[-+]?0+([0-9]+)")
+_CANNOT_START = re.compile("found character '[%@`]' that cannot start any token")
 
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
@@ -61,7 +63,9 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
             event = self.peek_event()  # type: ignore[no-untyped-call]
-            raise _rejected("aliases (*name) are not accepted", event)
+            raise _rejected(
+                "aliases (*name) are not accepted; quote text that begins with *", event
+            )
         return super().compose_node(parent, index)
 
     def read(self, node: yaml.Node, key: Key) -> Any:
@@ -71,6 +75,9 @@ class _Loader(yaml.SafeLoader):
             return [self.read(item, (*key, index)) for index, item in enumerate(node.value)]
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, key)
+        if node.style is None and (digits := _LEADING_ZERO.fullmatch(node.value)):
+            advice = f"write {digits[1]}, or quote it if it is text"
+            raise _rejected(f"{node.value} is octal in YAML, as it begins with 0; {advice}", node)
         try:
             value = self.construct_object(node)
         except ValueError as error:
@@ -157,7 +164,8 @@ def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         position = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
-        raise ConfigError(f"{position}: is not YAML: {error.problem or error.context}") from error
+        problem = _CANNOT_START.sub(r"\g<0>; quote the text", error.problem or error.context or "")
+        raise ConfigError(f"{position}: is not YAML: {problem}") from error
     except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     marks = loader.key_marks.items()

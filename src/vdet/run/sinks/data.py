@@ -159,7 +159,11 @@ class JsonSink(BaseSink):
         picture, boxes = result.frame.picture, list(map(track_record, result.tracks))
         for box in boxes:
             del box["id"], box["state"]  # they mean nothing in a single image
-        item = {"image": valid_text(str(result.source)), "width": picture.width, "height": picture.height}
+        item = {
+            "image": valid_text(str(result.source)),
+            "width": picture.width,
+            "height": picture.height,
+        }
         self._items.append({**item, "boxes": boxes, **result.frame_tracks.facts})
 
 
