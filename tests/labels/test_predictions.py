@@ -35,6 +35,15 @@ def record(**changes: object) -> str:
     return json.dumps({"frame": 4, "time": 0.16, "tracks": [track]} | changes)
 
 
+VIDEO = {"name": "in.mp4", "width": 320, "height": 240}
+WHOLE = record(video=VIDEO, last=True) + "\n"
+
+
+@pytest.mark.parametrize("content", [WHOLE, record(last=False) + "\n" + record(frame=5, last=True)])
+def test_a_file_of_tracks_says_that_it_is_whole(tmp_path: Path, content: str) -> None:
+    assert [frame.index for frame in read(tmp_path, "jsonl", content)][:1] == [4]
+
+
 @pytest.mark.parametrize(
     ("suffix", "content", "message"),
     [
@@ -60,6 +69,17 @@ def record(**changes: object) -> str:
         ("jsonl", JSONL + record(time=0.11), ":5: frame 4 is at 0.11 s; times must"),
         ("csv", CSV + "1,0.09,2,1,1,9,9,detected\n", ":3: frame 2 is at 0.08 s; times must"),
         ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
+        (
+            "jsonl",
+            JSONL + record(video=VIDEO),
+            ":5: another video begins; each video needs its own",
+        ),
+        ("jsonl", WHOLE + record(frame=5), ":2: another video begins; each video needs its own"),
+        ("jsonl", record(last=False) + "\n" + record(frame=5), ": is cut off after frame 5; copy"),
+        *(
+            ("jsonl", record(video=VIDEO | {"begin": begin}), ":1: video.begin: Input should ")
+            for begin in ("0001-01-01T00:00+14:00", "9999-12-31T23:59-14:00", "2026-05-01T07:00")
+        ),
     ],
 )
 def test_a_wrong_line_is_refused_with_its_number(

@@ -25,6 +25,7 @@ from writing import write_image
 WHOLE = {CSV, JSON_LINES}
 """Formats that keep all that is known of a track."""
 TIMED = WHOLE | {COCO}
+"""Formats that keep times and feet."""
 LISTING = {JSON_LINES, COCO}
 """Formats that keep the frames without a box."""
 MARKING = WHOLE | {COCO}
@@ -80,7 +81,7 @@ def kept(form: Format, track: Track) -> Track:
         track,
         state=state,
         class_name=names.get(form, track.class_name or "vehicle"),
-        whole_foot=track.whole_foot if whole else None,
+        whole_foot=track.whole_foot if form in TIMED else None,
         distance=track.distance if whole else None,
         lane=track.lane if whole else None,
     )

@@ -2,7 +2,7 @@
 
 import re
 from contextlib import suppress
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, ClassVar
 from zoneinfo import ZoneInfo
@@ -13,8 +13,8 @@ from vdet.config.section import Section
 from vdet.config.shapes import FramePoint, Shape, Size
 from vdet.errors import ConfigError
 
-_EARLIEST, _LATEST = 1990, 2200
-"""Years of recordings; cameras without a clock begin in 1904, 1970 or 1980."""
+EARLIEST, LATEST = datetime(1990, 1, 1, tzinfo=UTC), datetime(2200, 12, 31, tzinfo=UTC)
+"""Limits of the times of recordings; cameras without a clock begin in 1904, 1970 or 1980."""
 _LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
@@ -93,7 +93,7 @@ def parse_date_time(text: str) -> datetime:
     """Return the date and time that a text in ISO 8601 states. Raises `ValueError`."""
     with suppress(ValueError):
         date_time = datetime.fromisoformat(text)
-        if _EARLIEST <= date_time.year <= _LATEST:
+        if EARLIEST.year <= date_time.year <= LATEST.year:
             return date_time
     raise ValueError(f"{text!r} is not a time; expected one such as '2026-05-01 07:00+02:00'")
 

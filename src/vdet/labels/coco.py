@@ -61,7 +61,7 @@ class _Writer:
         self._lists[name].append(json.dumps(entry))
 
     def add_box(self, image: int, box: Box, category: int, score: float, **more: Any) -> None:
-        """Add an annotation; other programs ignore its `score`."""
+        """Add an annotation; other programs ignore its `score` and `foot`."""
         x, y, width, height = box.xywh
         ids = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
         sides = {"bbox": [x, y, width, height], "area": width * height, "segmentation": []}
@@ -99,7 +99,8 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
             category = writer.category(classes[track.id])
             occluded = track.state == "predicted"
             attributes = {"occluded": occluded, "track_id": track.id, "keyframe": True}
-            more = {"track_id": track.id, "attributes": attributes}
+            foot = list(track.written_foot)
+            more = {"track_id": track.id, "foot": foot, "attributes": attributes}
             writer.add_box(number, track.box, category, track.score, **more)
     for id_, name in classes.items():
         writer.add("tracks", id=id_, video_id=_VIDEO, category_id=writer.category(name))
@@ -145,6 +146,7 @@ class _Annotation:
     iscrowd: bool = False
     track_id: Index | None = None
     score: Number = 1.0
+    foot: tuple[Number, Number] | None = None
     attributes: _Attributes | None = None
 
     def label(self, position: str, name: str, frame: int) -> Label:
@@ -160,6 +162,7 @@ class _Annotation:
             id=id_ if isinstance(id_, int) and 0 <= id_ <= LIMIT else NO_ID,
             score=self.score,
             ignored=self.iscrowd,
+            foot=self.foot,
             state="predicted" if attributes.occluded else "detected",
         )
 

@@ -61,8 +61,10 @@ class Format:
     whole: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
 
 
-VIDEO, FINDINGS = "video", "findings"
-"""Names of the facts about a video, of its first frame, and of its findings, of its last."""
+VIDEO, FINDINGS, LAST = "video", "findings", "last"
+"""Names of the facts about a video, of its first frame; of its findings, of its last; and, of both,
+whether the frame is the last, so that a file that was cut off is noticed.
+"""
 
 
 class TrackWriter:
@@ -83,7 +85,7 @@ class TrackWriter:
             self._write_lines(self._last)
         else:
             values = self._video.record()
-            frame = replace(frame, facts={VIDEO: values, **frame.facts})
+            frame = replace(frame, facts={VIDEO: values, LAST: False, **frame.facts})
         self._last = frame
 
     def end(self, findings: tuple[Finding, ...] = ()) -> None:
@@ -92,7 +94,8 @@ class TrackWriter:
             self._form.whole(self._file, replace(self._video, findings=findings), self._kept)
         elif self._last:
             said = {FINDINGS: [finding.record() for finding in findings]} if findings else {}
-            self._write_lines(replace(self._last, facts={**self._last.facts, **said}))
+            facts = {**self._last.facts, LAST: True, **said}
+            self._write_lines(replace(self._last, facts=facts))
 
     def _write_lines(self, frame: FrameTracks) -> None:
         assert self._form.lines

@@ -9,13 +9,14 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pydantic
 from pydantic import AwareDatetime, Field, TypeAdapter
 
 from vdet.boxes import Box, Float64Array
+from vdet.config.camera import EARLIEST, LATEST
 from vdet.config.classes import our_name
 from vdet.errors import TruthError
 from vdet.findings import Finding
@@ -147,7 +148,7 @@ class SourceVideo:
     rate: float | None = None
     start: float | None = None
     end: float | None = None
-    begin: AwareDatetime | None = None
+    begin: Annotated[AwareDatetime, Field(ge=EARLIEST, le=LATEST)] | None = None
     begin_source: str | None = None
     classes: tuple[str, ...] = ()
     program: str = ""

@@ -100,6 +100,7 @@ class _Record:
     clock: str | None = None
     video: SourceVideo | None = None  # of the first frame
     findings: tuple[Finding, ...] = ()  # of the last frame
+    last: bool | None = None  # of the first and the last frame; None in files of vdet 1.1
 
 
 _ROW, _RECORD = TypeAdapter(_Row), TypeAdapter(_Record)
@@ -158,13 +159,17 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        The file is empty, a line is not such a record, frames do not increase, or a time is wrong.
+        The file is empty or cut off, or has a second video, a line is not such a record, frames do
+        not increase, or a time is wrong.
     """
     labels: list[Label] = []
     times: Times = {}
-    first, last = None, -1
+    first, last, is_whole = None, -1, False
     for line, content in numbered_lines(path, data):
         record = _checked(path, line, _RECORD.validate_json, content)
+        if is_whole or (first and record.video):
+            raise line_error(path, line, "another video begins; each video needs its own file")
+        is_whole = record.last is True
         if record.frame <= last:
             raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
         first, last = first or record, record.frame
@@ -172,6 +177,8 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         labels += [box.label(line, last) for box in record.tracks]
     if first is None:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
+    if first.last is False and not is_whole:
+        raise TruthError(f"{path}: is cut off after frame {last}; copy or write it again")
     seconds, begin = checked_times(path, times), _begin(path, times[first.frame], first.clock)
     saved = SavedTracks(tuple(labels), tuple(seconds), seconds, begin=begin)
     video = first.video and replace(first.video, findings=record.findings)

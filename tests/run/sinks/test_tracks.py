@@ -78,13 +78,13 @@ def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
     assert end + records == (
         ', "frame": 4, "time": 0.16, "tracks": [{"id": 1, "x": 10, "y": 20, "width": 30, '
         '"height": 40, "score": 0.9877, "state": "detected", "class": "car", "foot": [25.0, 60.0], '
-        '"distance": null, "lane": null}]}\n'
+        '"distance": null, "lane": null}], "last": false}\n'
         '{"frame": 5, "time": 0.333333, "tracks": []}\n'
         '{"frame": 6, "time": 0.24, "tracks": [{"id": 1, "x": 11, "y": 21, "width": 31, '
         '"height": 41, "score": 0.5, "state": "predicted", "class": "car", "foot": [27.25, 63.5], '
         '"distance": 18.25, "lane": -1}, {"id": 2, "x": 0, "y": -3, "width": 5, '
         '"height": 6, "score": 1.0, "state": "detected", "class": null, "foot": [2.5, 3.0], '
-        '"distance": null, "lane": null}]}\n'
+        '"distance": null, "lane": null}], "last": true}\n'
     )
 
 
