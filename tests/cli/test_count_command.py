@@ -59,11 +59,16 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
 def test_tracks_of_a_video_whose_name_is_not_utf8_can_be_counted(
     run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...], form: str
 ) -> None:
-    clip, tracks, fixes = tmp_path / "caf\udce9.mp4", tmp_path / f"t.{form}", tmp_path / "fixes.yaml"
+    clip, tracks, fixes = (
+        tmp_path / "caf\udce9.mp4",
+        tmp_path / f"t.{form}",
+        tmp_path / "fixes.yaml",
+    )
     clip.write_bytes((folder / "red.mp4").read_bytes())
     lines = ("-c", folder / "lines.yaml")
     run("detect-video", clip, "--no-video", "--tracks", tracks, *red, code=0)
-    assert read_tracks(tracks).video.name == r"caf\udce9.mp4"
+    video = read_tracks(tracks).video
+    assert video and video.name == r"caf\udce9.mp4"
     fixes.write_text("{video: 'caf\\udce9.mp4', size: [320, 240]}")
     run("count", tracks, "--corrections", fixes, *lines, code=0)
     wanted = ("--no-video", "--counts", tmp_path / "c.json", "--corrections", fixes)

@@ -17,10 +17,9 @@ def test_changes_are_those_of_all_options_also_with_odd_names() -> None:
     def command(source: SettingsSource) -> SettingsSource:
         return source
 
-    source = command.main(["--model", "🚗.onnx", "--set", "output.crf=18"], standalone_mode=False)
-    assert source.changes == ("output.crf=18", 'detector.model="🚗.onnx"')
+    source = command.main(["--model", "🚗\n.onnx", "--set", "output.crf=18"], standalone_mode=False)
     settings = source.load()
-    assert (settings.detector.model, settings.output.crf) == ("🚗.onnx", 18)
+    assert (settings.detector.model, settings.output.crf) == ("🚗\n.onnx", 18)
 
 
 @pytest.mark.parametrize(
@@ -35,6 +34,10 @@ def test_changes_are_those_of_all_options_also_with_odd_names() -> None:
         (
             ("--tracks", "t.csv", "--begin", "foo"),
             "--begin: 'foo' is not a time; expected one such",
+        ),
+        (
+            ("--tracks", "t.csv", "--model", "caf\udce9/net.onnx"),
+            "--model: must be UTF-8; rename the file or folder, or use a relative path (got 'caf",
         ),
         (("--tracks", "t.csv", "--set", "clips.margin=-1"), "--set: clips.margin: must be greater"),
     ],

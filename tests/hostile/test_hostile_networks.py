@@ -55,8 +55,8 @@ NETWORKS: Mapping[str, tuple[Write, str]] = {
     "names of many signs": (constant(ULTRALYTICS, names="-" * 100_000 + "1"), "cannot be read"),
     "no rows": (constant(np.zeros((1, 0, 0))), "has an unknown form"),
     "a single number": (constant(0.0), "has an unknown form"),
-    "no numbers": (constant(np.full((1, 84, CELLS), np.nan)), ""),
-    "endless numbers": (constant(np.full((1, 84, CELLS), np.inf)), ""),
+    "no numbers": (constant(np.full((1, 84, CELLS), np.nan)), "not finite"),
+    "endless numbers": (constant(np.full((1, 84, CELLS), np.inf)), "not finite"),
     "large numbers": (constant(np.full((1, 300, 6), 3e38)), ""),
 }
 

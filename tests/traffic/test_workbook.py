@@ -274,6 +274,8 @@ def test_without_clocks_and_classes_there_are_times_of_the_video(tmp_path: Path)
         tmp_path / "empty.xlsx", Survey({"a": replace(video, events=(), corrected=None)}, plain)
     )
     assert [*lines_of(empty)] == ["Summary", "Intervals", "Zones", "Files", "Notes"]
+    blank = replace(video, events=(event(5.5, "north", "in", 1, " "),))
+    assert lines_of(written(tmp_path / "blank.xlsx", Survey({"a": blank}, plain)))
 
 
 def test_turns_are_seen_from_the_arm_of_entry() -> None:

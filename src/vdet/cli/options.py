@@ -1,9 +1,8 @@
 """Options shared by several commands, so that a flag has one meaning everywhere, and results."""
 
-import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial, wraps
 from pathlib import Path
@@ -17,6 +16,7 @@ from vdet.files import FileIds, OutputFiles, json_text, output_errors, print_now
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
+    from vdet.config.document import Document
     from vdet.config.schema import Settings
     from vdet.evaluate.report import Report
 
@@ -171,14 +171,14 @@ class SettingsSource:
     configs
         Settings files, or the names of shipped ones.
     changes
-        Texts such as `output.crf=18`, also those of other options.
+        Texts such as `output.crf=18`.
     options
-        Names of these options by the setting that each changes, for messages.
+        The values of other options.
     """
 
     configs: Sequence[str] = ()
     changes: tuple[str, ...] = ()
-    options: Mapping[str, str] = field(default_factory=dict)
+    options: "tuple[Document, ...]" = ()
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -200,18 +200,13 @@ class SettingsSource:
 
     def load(self, *, detector: str | None = None) -> "Settings":
         """Read the settings; arguments and errors as for `load_settings`."""
-        if not (self.configs or self.changes or detector):
+        if not (self.configs or self.changes or self.options or detector):
             from vdet.config.schema import Settings
 
             return Settings()  # without YAML
         from vdet.config.loading import load_settings
 
-        try:
-            return load_settings(self.files, self.changes, detector=detector)
-        except ConfigError as error:
-            for key, option in self.options.items():
-                error.args = tuple(line.replace(f"--set: {key}", option, 1) for line in error.args)
-            raise
+        return load_settings(self.files, self.changes, self.options, detector=detector)
 
 
 def settings_options(**keys: str) -> Callable[[Function], Function]:
@@ -227,13 +222,17 @@ def settings_options(**keys: str) -> Callable[[Function], Function]:
         def with_source(
             configs: tuple[str, ...], assignments: tuple[str, ...], **values: Any
         ) -> Any:
-            changes, used = list(assignments), {}
+            options = []
             for name, key in keys.items():
                 value = values.pop(name)
                 if value is not None and value is not False and value != ():
-                    changes.append(f"{key}={json.dumps(value, default=str, ensure_ascii=False)}")
-                    used[key] = "--class" if name == "classes" else f"--{name}"
-            return command(source=SettingsSource(configs, tuple(changes), used), **values)
+                    from vdet.config.document import given
+
+                    option = "--class" if name == "classes" else f"--{name}"
+                    plain = str(value) if isinstance(value, Path) else value
+                    options.append(given(tuple(key.split(".")), plain, option))
+            source = SettingsSource(configs, assignments, tuple(options))
+            return command(source=source, **values)
 
         return with_source
 

@@ -2,6 +2,7 @@
 
 import re
 import reprlib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -75,6 +76,7 @@ class _Loader(yaml.SafeLoader):
             return [self.read(item, (*key, index)) for index, item in enumerate(node.value)]
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, key)
+        assert isinstance(node, yaml.ScalarNode)
         if node.style is None and (digits := _LEADING_ZERO.fullmatch(node.value)):
             advice = f"write {digits[1]}, or quote it if it is text"
             raise _rejected(f"{node.value} is octal in YAML, as it begins with 0; {advice}", node)
@@ -148,11 +150,15 @@ def parse_assignment(text: str) -> Document:
     path: Key = tuple(key.strip().split("."))
     if not equals or not all(path):
         raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
-    nested, positions = _parse(value, "--set")
+    parsed, positions = _parse(value, "--set")
+    return given(path, parsed, "--set", positions)
+
+
+def given(path: Key, value: Any, option: str, keys: Iterable[Key] = ()) -> Document:
+    """Return the document of a value that an option gives; `keys` are those inside it."""
     for part in reversed(path):
-        nested = {part: nested}
-    inside = ((*path, *key) for key in positions or [()])
-    return Document("--set", nested, dict.fromkeys(inside, "--set"))
+        value = {part: value}
+    return Document(option, value, dict.fromkeys([path, *((*path, *key) for key in keys)], option))
 
 
 def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:

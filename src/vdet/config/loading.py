@@ -49,24 +49,30 @@ def shipped_configs() -> dict[str, Path]:
 
 
 def load_settings(
-    paths: Sequence[Path] = (), assignments: Sequence[str] = (), *, detector: str | None = None
+    paths: Sequence[Path] = (),
+    assignments: Sequence[str] = (),
+    options: Sequence[Document] = (),
+    *,
+    detector: str | None = None,
 ) -> Settings:
     """Read settings: defaults, then the files at `paths`, then assignments such as `output.crf=18`.
 
+    `options` are the values of other options of the command line, after the assignments.
     `detector` is the kind of detector if no layer chooses one, or a model file, which tells the
     kind; None for the default.
 
     A list in a later layer replaces the whole list of an earlier one. Where a layer chooses another
     kind of detector or tracker than the layers below, that section starts from the defaults of this
-    kind. All assignments are one layer. A relative path in a file is relative to that file, and the
-    points in a file with `camera.size` are pixels of such frames.
+    kind. All assignments and options are one layer. A relative path in a file is relative to that
+    file, and the points in a file with `camera.size` are pixels of such frames.
 
     Raises
     ------
     ConfigError
         One line for each mistake, with file, line, column, key and what was expected.
     """
-    assigned = reduce(_over, map(document.parse_assignment, assignments), Document("--set", {}))
+    single = [*map(document.parse_assignment, assignments), *options]
+    assigned = reduce(_over, single, Document("--set", {}))
     layers = [*map(_read_layer, paths), _with_sizes(assigned)]
     for layer in layers:
         if isinstance(model := inside(layer.values, "detector", "model"), str):
@@ -196,6 +202,7 @@ def inside(values: Any, *keys: str) -> Any:
 _EXPECTED = {
     "model_type": "must be a section, key: value",
     "string_type": "must be text; quote it",
+    "string_unicode": "must be UTF-8; rename the file or folder, or use a relative path",
     "tuple_type": "must be a list",
     "zoneinfo_str": "must be a time zone, such as Europe/Berlin",
 }
@@ -203,8 +210,10 @@ _EXPECTED = {
 
 def _describe(mistake: ErrorDetails, merged: Document) -> str:
     key = tuple(mistake["loc"])
-    named = f"{document.format_key(key)}: " if key else ""
-    return f"{merged.position_of(key)}: {named}{_expected(mistake, key)}"
+    position = merged.position_of(key)
+    is_named = key and (position == "--set" or not position.startswith("--"))
+    named = f"{document.format_key(key)}: " if is_named else ""  # else the option says it
+    return f"{position}: {named}{_expected(mistake, key)}"
 
 
 def _expected(mistake: ErrorDetails, key: Key) -> str:

@@ -105,7 +105,7 @@ class _SheetWriter:
             self._row += 1
         for column, heading in enumerate(table.headings):
             self._page.write_string(self._row, column, valid_text(heading), self._style(**_HEADING))
-            self._widen(column, max(map(len, heading.split())))
+            self._widen(column, max(map(len, heading.split()), default=0))
         self._row += bool(table.headings)
         for row in table.rows:
             if self._row == _LAST_ROW:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -82,6 +83,19 @@ def test_boxes_as_fractions_of_the_input_are_refused(
     form = make(box=RedBox(x=0.5, y=0.5, width=0.25, height=0.25, class_id=2))
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=None)
     with pytest.raises(ModelError, match=r"its boxes are fractions of the input, not pixels"):
+        detect(path, frame_with_red(128, 128))
+
+
+@pytest.mark.parametrize("form", [final(BOX), ultralytics(SIZE, BOX, 80)])
+@pytest.mark.parametrize("row", [0, 4])
+def test_outputs_that_are_not_numbers_are_refused(form: Form, row: int, tmp_path: Path) -> None:
+    table = form.table.copy()
+    column = 7 if len(table) == 84 else 2
+    table[(row, column) if len(table) == 84 else (column, row)] = math.nan
+    path = write_network(tmp_path / "net.onnx", replace(form, table=table), SIZE, (64, 32))
+    with pytest.raises(
+        ModelError, match=r"net\.onnx: its output has numbers that are not finite; exp"
+    ):
         detect(path, frame_with_red(128, 128))
 
 

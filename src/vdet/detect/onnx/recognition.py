@@ -88,7 +88,7 @@ def joined(parts: Sequence[RawBoxes]) -> RawBoxes:
 
 
 OutputLayout = Callable[[Array, float], RawBoxes]
-"""Converts an output to boxes in pixels of the input; drops scores below a minimum."""
+"""Converts an output to boxes in pixels of the input; drops scores below a minimum, not a NaN."""
 
 
 def our_cells(
@@ -105,7 +105,7 @@ def our_cells(
     best = table[:, 5:].argmax(axis=1)
     slopes, offsets = calibration[best].T
     logits = slopes * table[:, 0] + offsets
-    rows = np.flatnonzero(logits >= math.log(minimum / (1 - minimum)))
+    rows = np.flatnonzero(~(logits < math.log(minimum / (1 - minimum))))
     lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]
     middle = centers[rows]
     sides = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
@@ -118,7 +118,7 @@ def center_columns(output: Array, minimum: float) -> RawBoxes:
     table = output[0].T
     scores = table[:, 4:]
     best, classes = scores.max(axis=1), scores.argmax(axis=1)
-    rows = np.flatnonzero(best >= minimum)
+    rows = np.flatnonzero(~(best < minimum))
     middle, half = table[rows, :2], table[rows, 2:4] / 2
     sides = np.concatenate([middle - half, middle + half], axis=1)
     return _raw(sides, best[rows], classes[rows], scores[rows])
@@ -127,7 +127,7 @@ def center_columns(output: Array, minimum: float) -> RawBoxes:
 def final_rows(output: Array, minimum: float) -> RawBoxes:
     """Read `(1, n, 6)` after suppression: x1, y1, x2, y2, score, class; empty rows have score 0."""
     table = output[0]
-    table = table[table[:, 4] >= minimum]
+    table = table[~(table[:, 4] < minimum)]
     return _raw(table[:, :4], table[:, 4], table[:, 5])
 
 
@@ -299,6 +299,9 @@ class Recognized:
                 boxes = replace(raw, sides=placement.to_frame(raw.sides))
         except (ValueError, TypeError, IndexError) as error:
             raise _unknown(self.session, f"its output is {_shapes(outputs)}") from error
+        if not (np.isfinite(raw.scores).all() and np.isfinite(raw.sides).all()):
+            seen = "its output has numbers that are not finite"
+            raise ModelError(f"{self.session.path}: {seen}; export it in float32")
         if raw.sides.max(initial=-math.inf) < _NORMALISED and len(raw.sides):
             raise _unknown(self.session, "its boxes are fractions of the input, not pixels")
         return boxes
