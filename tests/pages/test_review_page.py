@@ -12,7 +12,7 @@ from browser import ENTER, Browser, browser, downloaded
 from conftest import Run
 from review_roads import Car, draw_road, write_review
 
-CARS = [Car(3, 80), Car(5, 240, goes_up=False), Car(8, 100), Car(64, 80)]
+CARS = [Car(3, 80), Car(3.6, 240, goes_up=False), Car(8, 100), Car(64, 80)]
 TAB = "\ue004"
 
 
@@ -92,7 +92,8 @@ def test_the_saved_file_corrects_the_counts_and_is_their_truth(
     click_at(window, 8, 0.29)  # of a minute that is not checked yet
     window.type("s")
     path = downloaded(window.folder, "corrections.yaml")
-    assert len(yaml.safe_load(path.read_text("utf-8"))["events"]) == 1
+    [missed] = yaml.safe_load(path.read_text("utf-8"))["events"]
+    assert missed["error"] == "missed"
     path.unlink()
     window.type(TAB, "x", ENTER, "s")
     review, plain = downloaded(window.folder, "corrections.yaml"), tmp_path / "plain.csv"
@@ -109,12 +110,14 @@ def test_the_saved_file_corrects_the_counts_and_is_their_truth(
 def test_the_class_and_the_direction_of_a_mark_may_both_be_wrong(window: Browser) -> None:
     window.type(TAB, "3", "d")
     assert window.run("return document.querySelector('#details img').naturalWidth") == 28
-    false, missed = saved(window)["events"]
-    assert false == {**false, "error": "false", "direction": "away"}
-    assert missed["class"] == window.run("return data.classes[2]")
-    assert (missed["error"], missed["direction"], missed.get("id")) == ("missed", "here", None)
+    wrong, neighbour = saved(window)["events"]
+    truck = window.run("return data.classes[2]")
+    assert (wrong["id"], wrong["error"], wrong["correct"]) == (
+        1, ["class", "direction"], [truck, "here"],
+    )  # fmt: skip
+    assert (neighbour["id"], "error" in neighbour) == (2, False), "of a minute that is not checked"
     window.type("x")
-    assert [event["error"] for event in saved(window)["events"]] == ["false"]
+    assert [event.get("error") for event in saved(window)["events"]] == ["false", None]
 
 
 def test_undo_and_reload_keep_what_was_checked(window: Browser) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
@@ -39,15 +39,19 @@ NO_FRAME = -1
 
 Error = Literal["false", "missed", "class", "direction"]
 """Nothing passed; something passed that was not counted; a wrong class; a wrong direction."""
-_ErrorText = Annotated[Error, BeforeValidator(lambda value: "false" if value is False else value)]
-"""As YAML has it, where `false` without quotes is no text."""
+
+
+def _listed(value: Any) -> Any:
+    """Return a list of one value where a file has only that; `false` without quotes is no text."""
+    value = "false" if value is False else value
+    return [value] if isinstance(value, str) else value or ()
 
 
 class ReviewedEvent(Section):
-    """An event as it was counted, or missed; its error, and what is `correct`.
+    """An event as it was counted, or missed; its errors, and what is `correct`.
 
-    `time` is in seconds in the video. `error` is None for what was counted rightly. `correct` is
-    the class or the direction.
+    `time` is in seconds in the video. `errors` is empty for what was counted rightly; class and
+    direction may both be wrong. `correct` has the right value for each of these.
     """
 
     name: Name = Field(alias="line")
@@ -55,32 +59,51 @@ class ReviewedEvent(Section):
     direction: Name
     class_name: Name = Field(UNKNOWN, alias="class")
     id: int = NO_ID
-    error: _ErrorText | None = None
-    correct: Name | None = None
+    errors: Annotated[tuple[Error, ...], BeforeValidator(_listed)] = Field((), alias="error")
+    correct: Annotated[tuple[Name, ...], BeforeValidator(_listed)] = ()
 
     def __str__(self) -> str:
         return f"{self.name}, {self.time:g} s, {self.direction}, {self.class_name}"
 
     @model_validator(mode="after")
     def _says_what_is_correct(self) -> "ReviewedEvent":
-        if (self.correct is None) == (self.error in ("class", "direction")):
+        if len(self.errors) > 1 and {*self.errors} != {"class", "direction"}:
+            raise ValueError("error: only class and direction can both be wrong")
+        are_known = {*self.errors} <= {"class", "direction"}
+        if len(self.correct) != len(self.errors) * are_known:
             raise ValueError("correct: is required for error: class and direction, and only there")
         return self
 
     @property
+    def _correct(self) -> dict[str, str]:
+        return dict(
+            zip(self.errors, self.correct, strict=False)
+        )  # nothing is correct of the others
+
+    @property
     def true_direction(self) -> str:
         """The direction in which the vehicle passed."""
-        return self.correct if self.correct and self.error == "direction" else self.direction
+        return self._correct.get("direction", self.direction)
 
     @property
     def true_class(self) -> str:
         """The class of the vehicle that passed; ours for a synonym."""
-        label = self.correct if self.correct and self.error == "class" else self.class_name
+        label = self._correct.get("class", self.class_name)
         return our_name(label) or label
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether the vehicle passed, but was not counted."""
+        return "missed" in self.errors
+
+    @property
+    def is_false(self) -> bool:
+        """Whether it was counted, but no vehicle passed."""
+        return "false" in self.errors
 
     def corrected(self, event: Event | None) -> Event | None:
         """Return the event as it should have been counted; None: it should not, or was not."""
-        if self.error == "missed":
+        if self.is_missed:
             event = event or Event(
                 time=self.time,
                 frame=NO_FRAME,
@@ -91,15 +114,15 @@ class ReviewedEvent(Section):
                 class_name=self.true_class,
                 score=1.0,
             )
-        if event is None or self.error == "false":
+        if event is None or self.is_false:
             return None
-        class_name = self.true_class if self.error in ("class", "missed") else event.class_name
+        class_name = self.true_class if {"class", "missed"} & {*self.errors} else event.class_name
         return replace(event, direction=self.true_direction, class_name=class_name)
 
     @property
-    def opinion(self) -> tuple[str | None, ...]:
+    def opinion(self) -> tuple[str, ...]:
         """What two reviewers must agree on."""
-        return self.error, self.true_direction, self.true_class
+        return *self.errors, self.true_direction, self.true_class
 
 
 class CheckedSpan(Section):
@@ -168,7 +191,7 @@ class Corrections(Section):
     sample: Sample | None = None
     checked: tuple[CheckedSpan, ...] = ()
     events: tuple[ReviewedEvent, ...] = ()
-    """All errors, and what was counted rightly in the checked parts and beside missed vehicles."""
+    """All errors, and what was counted rightly in the checked parts and near all errors."""
     _files: tuple[str, ...] = PrivateAttr(("corrections",))
 
     @model_validator(mode="after")
@@ -232,8 +255,8 @@ class Corrections(Section):
         added = [second for first, second in pairs if second and not first]
         alone = [first for first, second in pairs if first and not second]
         disputed = [a for a, b in pairs if a and b and a.opinion != b.opinion]
-        disputed += [event for event in alone if event.error and review.has_checked(event)]
-        disputed += [event for event in added if event.error and self.has_checked(event)]
+        disputed += [event for event in alone if event.errors and review.has_checked(event)]
+        disputed += [event for event in added if event.errors and self.has_checked(event)]
         if disputed:
             raise ConfigError(
                 f"{self.source} and {review.source}: contradict each other: {disputed[0]}; "
@@ -268,10 +291,10 @@ class Corrections(Section):
 
     def passed(self) -> list[ReviewedEvent]:
         """Return what passed: the events as they should have been counted."""
-        classes = {event.id: event.true_class for event in self.events if event.error == "class"}
+        classes = {event.id: event.true_class for event in self.events if "class" in event.errors}
         classes.pop(NO_ID, None)
         passed = []
-        for event in (event for event in self.events if event.error != "false"):
+        for event in (event for event in self.events if not event.is_false):
             true_class = classes.get(event.id, event.true_class)
             update = {"direction": event.true_direction, "class_name": true_class}
             passed.append(event.model_copy(update=update))
@@ -283,19 +306,16 @@ class Corrections(Section):
         """Return its events, each with the counted event that it is about.
 
         A missed vehicle may have been counted by another run: as an event that the reviewer says
-        nothing of. That is known if the file has what was counted rightly.
+        nothing of.
 
         Raises
         ------
         ConfigError
             An error fits no event.
         """
-        has_counted = any(event.error is None for event in self.events)
-        reviewed = [e for e in self.events if has_counted or e.error != "missed"]
-        missed = [e for e in self.events if not has_counted and e.error == "missed"]
-        pairs = [*paired(reviewed, events), *((event, None) for event in missed)]
+        pairs = paired(self.events, events)
         for review, event in pairs:
-            if review and not event and review.error not in (None, "missed"):
+            if review and not event and review.errors and not review.is_missed:
                 raise ConfigError(
                     f"{self.source}: {review}: no such event was counted within {TOLERANCE} s; "
                     "remove this correction, or check these counts anew"
@@ -376,7 +396,7 @@ def _corrected(counts: Counts, review: Corrections, classes: dict[int, str]) -> 
         changes += right_event != event
         if right_event:
             events.append(right_event)
-        if reviewed and event and reviewed.error in ("class", "missed"):
+        if reviewed and event and {"class", "missed"} & {*reviewed.errors}:
             true_class = classes.setdefault(event.vehicle, reviewed.true_class)
             if true_class != reviewed.true_class:
                 raise ConfigError(
@@ -425,10 +445,10 @@ def _estimates(
         CountError(
             minute=numbers[minute],
             counted=class_of(event) if event else None,
-            true=None if reviewed.error == "false" else reviewed.true_class,
+            true=None if reviewed.is_false else reviewed.true_class,
         )
         for reviewed, event in pairs
-        if reviewed and reviewed.error and (minute := review.minute(reviewed.time)) in checked
+        if reviewed and reviewed.errors and (minute := review.minute(reviewed.time)) in checked
     ]
     sample = review.sample.minutes if review.sample else ()
     drawn = [numbers[minute] for minute in sample if minute in numbers]

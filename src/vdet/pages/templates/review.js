@@ -306,20 +306,16 @@ function spans() {
   return joined;
 }
 
-function eventLine(mark, error, correct) {
-  const time = Math.round(1000 * (mark.seconds + data.start)) / 1000;
+/** Return the line of the file for a mark, with all that is wrong of it. */
+function eventLine(mark) {
+  const time = Math.round(1000 * (mark.seconds + data.start)) / 1000, errors = Object.keys(mark.fixes);
+  const correct = errors.map(error => mark.fixes[error]).filter(value => value !== null);
   const parts = [`line: ${quoted(mark.line)}`, `time: ${time}`, `direction: ${quoted(mark.direction)}`, `class: ${quoted(mark.class)}`];
+  const words = values => values.length > 1 ? `[${values.map(quoted).join(", ")}]` : quoted(values[0]);
   if (mark.id !== undefined) parts.push(`id: ${mark.id}`);
-  if (error) parts.push(`error: ${quoted(error)}`);
-  if (correct) parts.push(`correct: ${quoted(correct)}`);
+  if (errors.length) parts.push(`error: ${words(errors)}`);
+  if (correct.length) parts.push(`correct: ${words(correct)}`);
   return `  - {${parts.join(", ")}}`;
-}
-
-/** Return the lines of the file for a mark. If class and direction are wrong, it is false, and a vehicle was missed. */
-function eventLines(mark) {
-  const { class: name, direction } = mark.fixes;
-  if (name && direction) return [eventLine(mark, "false"), eventLine({ ...mark, id: undefined, class: name, direction }, "missed")];
-  return [eventLine(mark, ...(Object.entries(mark.fixes)[0] ?? []))];
 }
 
 function list(name, items) {
@@ -333,10 +329,10 @@ function corrections() {
   const zones = data.zones.map(zone => `  - {name: ${quoted(zone.name)}, points: [${zone.points.map(pair).join(", ")}]}`);
   const names = [...new Set(data.bands.map(band => band.name))];
   const checked = names.flatMap(name => spans().map(([start, end]) => `  - {line: ${quoted(name)}, start: ${start + data.start}, end: ${end + data.start}}`));
-  const complete = spans().concat(state.missed.map(mark => [mark.seconds, mark.seconds]));
-  const isListed = mark => Object.keys(mark.fixes).length ||
-    complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
-  const events = allMarks().filter(isListed).sort((a, b) => a.seconds - b.seconds).flatMap(eventLines);
+  const isWrong = mark => Object.keys(mark.fixes).length > 0;
+  const complete = spans().concat(allMarks().filter(isWrong).map(mark => [mark.seconds, mark.seconds]));
+  const isListed = mark => isWrong(mark) || complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
+  const events = allMarks().filter(isListed).sort((a, b) => a.seconds - b.seconds).map(eventLine);
   const sample = state.sample ? `{seed: ${state.sample.seed}, minutes: [${state.sample.minutes.join(", ")}]}` : "null";
   return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, `start: ${data.start}`, ...list("lines", lines), ...list("zones", zones),
     `reviewer: ${state.reviewer ? quoted(state.reviewer) : "null"}`, `saved: ${now()}`, `sample: ${sample}`,
