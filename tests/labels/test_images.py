@@ -205,6 +205,32 @@ def test_images_in_other_folders_are_found_by_their_names(tmp_path: Path, name: 
 
 
 @pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        *(("a ü", name) for name in ("a%20%C3%BC.png", "a+%C3%BC.png", "/d/?d=x/a%20ü.png")),
+        *(("a ü", name) for name in ("x%2Fa+%C3%BC.png?size=9", "%2E%2E/a%20ü.png")),
+        *(("a%20b", name) for name in ("a%20b.png", "/data/a%20b.png")),
+    ],
+)
+def test_names_may_be_addresses(tmp_path: Path, file: str, name: str) -> None:
+    path = write_coco(tmp_path, {"x": Labelled(WIDTH, HEIGHT), file: Labelled(WIDTH, HEIGHT)})
+    path.write_text(path.read_text(encoding="utf-8").replace(f"{json.dumps(file)[1:-1]}.png", name))
+    found = [image.path for image in read_labelled_images(path).images]
+    assert found == [tmp_path / "x.png", tmp_path / f"{file}.png"]
+
+
+def test_boxes_that_are_probably_percent_give_a_hint(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for width, height, warnings in ((320, 240, 1), (64, 32, 0)):
+        write_coco(tmp_path, {"a": Labelled(width, height, (Boxed("car", (5, 5, 40, 20)),))})
+        read_labelled_images(tmp_path)
+        assert len(caplog.messages) == warnings
+        assert all("if these are percent, convert them" in text for text in caplog.messages)
+        caplog.clear()
+
+
+@pytest.mark.parametrize(
     ("key", "values", "words"),
     [
         ("annotations", {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),

@@ -25,6 +25,21 @@ def test_truth_with_spaces_is_read_and_several_classes_are_named(
     assert caplog.messages == [f"{path}: {text}; keep only the rows of vehicles"]
 
 
+def test_truth_of_uavdt_has_vehicles_partly_outside_and_a_file_of_ignore_regions(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path, regions = tmp_path / "M01_gt_whole.txt", tmp_path / "M01_gt_ignore.txt"
+    path.write_text("1,7,11,21,20,10,2,1,1\n1,8,1,1,9,9,3,1,3\n")
+    regions.write_text("1,7,101,1,50,50,1,-1,-1\n")
+    found = [(label.id, label.box[0], label.ignored) for label in read_truth(path).labels]
+    assert found == [(7, 10, False), (8, 0, False), (-1, 100, True)]
+    assert caplog.messages == []
+    path.write_text("1,7,11,21,20,10,0,-1,-1,-1\n")
+    assert all(label.ignored for label in read_truth(path).labels)
+    text = "has no vehicle, only ignore regions; column 7 is 0 in all lines"
+    assert caplog.messages == [f"{path}: {text}"]
+
+
 def test_tracks_are_written_without_a_heading() -> None:
     assert written(MOT, [frame(4, car())]) == b"5,1,11,21,30,40,0.7500,-1,-1,-1\n"
 

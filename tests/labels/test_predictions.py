@@ -39,7 +39,9 @@ VIDEO = {"name": "in.mp4", "width": 320, "height": 240}
 WHOLE = record(video=VIDEO, last=True) + "\n"
 
 
-@pytest.mark.parametrize("content", [WHOLE, record(last=False) + "\n" + record(frame=5, last=True)])
+@pytest.mark.parametrize(
+    "content", [WHOLE, record(last=False) + "\n" + record(frame=5, time=0.2, last=True)]
+)
 def test_a_file_of_tracks_says_that_it_is_whole(tmp_path: Path, content: str) -> None:
     assert [frame.index for frame in read(tmp_path, "jsonl", content)][:1] == [4]
 
@@ -68,6 +70,11 @@ def test_a_file_of_tracks_says_that_it_is_whole(tmp_path: Path, content: str) ->
         ("jsonl", JSONL + record(frame="x"), ":5: frame: Input should be a valid integer"),
         ("jsonl", JSONL + record(time=0.11), ":5: frame 4 is at 0.11 s; times must"),
         ("csv", CSV + "1,0.09,2,1,1,9,9,detected\n", ":3: frame 2 is at 0.08 s; times must"),
+        (
+            "csv",
+            HEADER + "".join(f"{n},{n / 25 / 86400},1,1,1,9,9,detected\n" for n in range(3)),
+            ":4: more than 10,000 frames a second; times must be seconds",
+        ),
         ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
         (
             "jsonl",

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
+from urllib.parse import unquote, unquote_plus
 
 from vdet.boxes import Image
 from vdet.errors import ImageError, TruthError, counted, printable
@@ -15,6 +16,8 @@ from vdet.labels.label import Corners, Label, Size, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import read_image
 
+_PERCENT = 100
+"""If all boxes end below it, in images more than twice as large, they are probably percent."""
 _SLACK = 0.1
 """How far a box may extend beyond a side of the image, as a fraction of it."""
 
@@ -91,6 +94,7 @@ def checked_images(
     checked: dict[Path, LabelledImage] = {}
     omitted, ignored = Counter[str](), Counter[str]()
     boxes = repeated = absurd = 0
+    farthest, smallest = 0.0, math.inf
     for image in images:
         labels = tuple(
             {(label.box, label.name, label.ignored): label for label in image.labels}.values()
@@ -98,6 +102,8 @@ def checked_images(
         boxes += len(labels)
         repeated += len(image.labels) - len(labels)
         absurd += sum(_is_absurd(label.box, image.size) for label in labels)
+        farthest = max([farthest, *(max(label.box) for label in labels)])
+        smallest = min(smallest, *(image.size or (0,)))
         if image.path in checked:
             raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
         checked[image.path] = replace(
@@ -111,6 +117,10 @@ def checked_images(
         raise TruthError(
             f"{name}: {absurd} of {counted(boxes, 'box')} are outside their images or within a "
             "pixel; the numbers must be in the unit of the format"
+        )
+    if 0 < farthest <= _PERCENT < smallest / 2:
+        _log.warning(
+            "%s: no box reaches beyond pixel 100; if these are percent, convert them", name
         )
     if repeated:
         duplicates = counted(repeated, "label")
@@ -161,30 +171,41 @@ def inside(name: str) -> str:
 def image_names(path: Path, names: Sequence[str]) -> list[Path]:
     """Return the paths of the images that a file of labels names.
 
-    If the first one is not found, or one is absolute, only the last parts of the names are used,
-    such as `a.jpg` of `/data/upload/1/a.jpg` or `/data/?d=images/a.jpg`; a backslash separates
-    folders, too. Raises `TruthError` if an image is not found, or two have the same name.
+    If not all are found by these names, they may be addresses (`a%20b.jpg`, `a+b.jpg`), and then
+    only their last parts are used, such as `a.jpg` of `/data/upload/1/a.jpg` or
+    `/data/?d=images/a.jpg`; a backslash separates folders, too. Raises `TruthError` if no folder
+    has the first image, or several have.
     """
-    try:
-        if any(PurePosixPath(name).is_absolute() for name in names):
-            raise TruthError(f"{path}: has absolute names of images; make them relative")
-        folder = image_folder(path, names[0]) if names else path.parent
-        return [folder / name for name in names]
-    except TruthError:
-        parts = (name.rpartition("?d=")[2].partition("?")[0] for name in names)
-        last_parts = [re.split(r"[/\\]", part)[-1] for part in parts]
-        if last_parts == list(names) or len(set(last_parts)) < len(names):
-            raise
-        folder = image_folder(path, last_parts[0])
-        return [folder / name for name in last_parts]
+    addresses = [name.rpartition("?d=")[2].partition("?")[0] for name in names]
+    decoded = [list(map(decode, addresses)) for decode in (unquote, unquote_plus)]
+    last_parts = [[re.split(r"[/\\]", name)[-1] for name in item] for item in (addresses, *decoded)]
+    found: list[list[Path]] = []
+    errors: list[TruthError] = []
+    for spelled in (list(names), *decoded, *last_parts):
+        if names and len(set(spelled)) == len(set(names)):
+            try:
+                folder = image_folder(path, spelled)
+            except TruthError as error:
+                errors.append(error)
+            else:
+                found.append([folder / name for name in spelled])
+                if all(map(is_file, found[-1])):
+                    return found[-1]
+    if errors and not found:
+        raise errors[0]
+    return found[0] if found else []
 
 
-def image_folder(path: Path, name: str) -> Path:
+def image_folder(path: Path, names: Sequence[str]) -> Path:
     """Return the folder that image names are relative to: the one that has the first image.
 
     It is the folder of the label file or at most two folders below; if the file is in
-    `annotations`, below the parent folder. Raises `TruthError` if there is none or several.
+    `annotations`, below the parent folder. Raises `TruthError` if there is none or several, or a
+    name is absolute or points outside the set.
     """
+    if any(name.startswith("/") or ".." in PurePosixPath(name).parts for name in names):
+        raise TruthError(f"{path}: has absolute names of images; make them relative")
+    name = names[0]
     near, shown = path.parent, printable(name)
     above = near.parent if near.name == "annotations" else near
     for level in ([near], [above], sorted(above.glob("*/")), sorted(above.glob("*/*/"))):

@@ -285,9 +285,9 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
 
     Results have ten columns: frame, id, left, top, width, height, confidence, -1, -1, -1. Truth has
     nine, as in `gt.txt`: frame, id, left, top, width, height, flag, class, visibility. Flag 0 marks
-    an ignore region, 1 a vehicle. The class is not used, because its numbers differ between tools;
-    neither is the visibility. Several classes give a warning (logger "vdet"). Columns may also be
-    separated by spaces.
+    an ignore region, 1 a vehicle; UAVDT has 1 to 3, by how much of it is outside. The class is not
+    used, because its numbers differ between tools; neither is the visibility. Several classes give
+    a warning (logger "vdet"). Columns may also be separated by spaces.
 
     Raises
     ------
@@ -322,7 +322,7 @@ def _mot_labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
         is_truth = len(columns) == _TRUTH_COLUMNS
         named = dict(zip(_NAMES, columns, strict=False))
         row = _checked(path, line, _MOT_ROW.validate_python, named)
-        if is_truth and row.score not in {0, 1}:
+        if is_truth and row.score not in {0, 1, 2, 3}:
             message = f"with nine columns, column 7 must be a flag, 0 or 1, but is {row.score:g}"
             raise line_error(path, line, f"{message}; a results file needs ten columns")
         if row.score and columns[7].strip().isdecimal():

@@ -22,6 +22,8 @@ MAX_BYTES = 300_000_000
 _LAST_NUMBER = re.compile(r"(?<![0-9])([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
 """Maximum time in seconds, three thousand years of wall-clock time."""
+_MAX_RATE = 10_000
+"""Maximum frames per second on average; times in days have more."""
 
 Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0, le=LIMIT)]
@@ -66,14 +68,19 @@ def checked_times(path: Path, times: Times) -> dict[int, float]:
     Raises
     ------
     TruthError
-        A time is not a number, is too large, or is less than that of an earlier frame.
+        A time is not a number, is too large, is less than that of an earlier frame, or cannot be
+        in seconds.
     """
     latest = -_LATEST
-    for frame, (position, time) in sorted(times.items()):
+    ordered = sorted(times.items())
+    for frame, (position, time) in ordered:
         if not latest <= time <= _LATEST:
             message = f"frame {frame} is at {time:g} s; times must be numbers and must not decrease"
             raise line_error(path, position, message)
         latest = time
+    if ordered and (ordered[-1][0] - ordered[0][0]) > _MAX_RATE * (latest - ordered[0][1][1]):
+        fault = f"more than {_MAX_RATE:,} frames a second; times must be seconds"
+        raise line_error(path, ordered[-1][1][0], fault)
     return {frame: time for frame, (_, time) in times.items()}
 
 

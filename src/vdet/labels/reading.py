@@ -2,6 +2,7 @@
 
 import gc
 import logging
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from vdet.findings import warnings_in
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images
-from vdet.labels.label import Label, SavedTracks, Size, checked_labels, line_error
+from vdet.labels.label import NO_ID, Label, SavedTracks, Size, checked_labels, line_error
 from vdet.labels.lines import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
@@ -64,7 +65,9 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:
     """Read the vehicles and ignore regions of a video from any format of tracks.
 
     Boxes without a label are vehicles. In MOTChallenge, flag 0 marks an ignore region, also in the
-    older variant with ten columns.
+    older variant with ten columns. All boxes of `X_gt_ignore.txt` beside `X_gt.txt` or
+    `X_gt_whole.txt`, as in UAVDT, are ignore regions. A truth without a vehicle gives a warning
+    (logger "vdet").
 
     Parameters
     ----------
@@ -84,8 +87,16 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:
     saved = form.read(path, data)
     labels: Iterable[Label] = saved.labels
     if form is MOT:  # in the older variant, the score is the flag
-        labels = (label._replace(ignored=label.score == 0 or label.ignored) for label in labels)
-    return replace(saved, labels=checked_labels(path, _with_roles(path, labels, roles)))
+        labels = [label._replace(ignored=label.score == 0 or label.ignored) for label in labels]
+        regions = path.with_stem(re.sub(r"_gt(_whole)?$", "_gt_ignore", path.stem))
+        if regions != path and regions.is_file():
+            more = form.read(regions, read_bytes(regions)).labels
+            labels += (label._replace(id=NO_ID, ignored=True) for label in more)
+    checked = checked_labels(path, _with_roles(path, labels, roles))
+    if checked and all(label.ignored for label in checked):
+        flags = "; column 7 is 0 in all lines" if form is MOT else ""
+        _log.warning("%s: has no vehicle, only ignore regions%s", path, flags)
+    return replace(saved, labels=checked)
 
 
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:
