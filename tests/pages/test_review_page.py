@@ -61,6 +61,8 @@ def test_a_minute_without_errors_takes_one_key(window: Browser) -> None:
     assert not any("error" in event for event in values["events"])
     window.type(ENTER)
     assert saved(window)["checked"] == [{"line": "gate", "start": 0, "end": 120}]
+    odd = "a\x85\u2028b\n"
+    assert yaml.safe_load(window.run("return quoted(arguments[0])", odd)) == odd
 
 
 def test_every_error_takes_two_actions(window: Browser) -> None:

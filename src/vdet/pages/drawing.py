@@ -89,7 +89,8 @@ class Drawing:
             "places": shapes,
             "rest": other_settings,
         }
-        script = Markup((TEMPLATES / "draw.js").read_text("utf-8"))
+        scripts = ((TEMPLATES / script).read_text("utf-8") for script in ("yaml.js", "draw.js"))
+        script = Markup("\n".join(scripts))
         return render("draw.html", data=data, name=name, script=script)
 
     def _marks(self) -> list[Mark]:

@@ -22,7 +22,7 @@ from vdet.traffic.traces import Trace
 
 PAGE_NAME = "review.html"
 _PICTURES = "<!-- pictures -->"
-_SCRIPTS = "estimate.js", "review.js"
+_SCRIPTS = "yaml.js", "estimate.js", "review.js"
 
 
 @dataclass(frozen=True, slots=True)

@@ -366,12 +366,6 @@ const FORMS = { // the lists of the file, and what their items have
   lines: ["name", "start", "end", "left", "right", "approach", "flows"], zones: ["name", "points", "flows"],
 };
 
-/** Escape the characters that YAML takes for line breaks, or does not allow, although JSON has them. */
-function escaped(text) {
-  return text.replace(/[\0-\x1f\x7f-\x9f\u2028\u2029\ufeff]/g,
-    character => `\\u${character.charCodeAt(0).toString(16).padStart(4, "0")}`);
-}
-
 /** Remove the last corner of a polygon where it repeats the first one. */
 function withoutRepeated(item) {
   const { points } = item, isClosed = points?.length > 3 && String(points[0]) === String(points.at(-1));

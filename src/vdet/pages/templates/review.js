@@ -286,7 +286,7 @@ function refresh(isNew = false) {
 }
 
 // ---------------------------------------------------------------- the file
-const quoted = text => JSON.stringify(String(text));
+const quoted = text => escaped(JSON.stringify(String(text)));
 const pair = point => `[${point.map(value => Math.round(100 * value) / 100).join(", ")}]`;
 
 function now() {
