@@ -1,19 +1,22 @@
 """Files of tracks that follow one another: a vehicle on both sides of a seam counts once."""
 
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path as File
 
 import pytest
 
-from traffic.scenes import Path, frames, settings_for, through
+from traffic.scenes import CAR_HEIGHT, Path, settings_for, through, track
+from vdet.config.camera import ClockSettings
 from vdet.config.schema import InputSettings
 from vdet.config.shapes import LineSettings, ZoneSettings
+from vdet.errors import TruthError
 from vdet.labels.formats import TrackWriter
 from vdet.labels.label import SourceVideo
 from vdet.labels.lines import JSON_LINES
 from vdet.track.track import FrameTracks
-from vdet.traffic.counting import count_files
+from vdet.traffic.counting import count_files, natural_order
 from vdet.traffic.counts import Counts, flow_table, zone_table
 
 SETTINGS = settings_for(
@@ -29,20 +32,35 @@ STANDS = through((2, 540, 600), (4, 600, 600), (18, 601, 600))
 CLOCK = datetime(2026, 5, 1, 7, tzinfo=UTC)
 
 
-def write_part(path: File, first: float, last: float, *paths: Path, clock: float = -1) -> File:
+def write_part(
+    path: File,
+    first: float,
+    last: float,
+    *paths: Path,
+    clock: float = -1,
+    scale: float = 1,
+    kind: str | None = None,
+    height: int = CAR_HEIGHT,
+) -> File:
     """Write a part of the tracks of 60 s into a file whose frames begin at 0.
 
-    `clock` is its start in the file itself, seconds after 7:00; -1: only the name has it.
+    `clock` is its start in the file itself, seconds after 7:00; -1: only the name has it. `scale`
+    is that of the frames, `kind` and `height` are those of the vehicles.
     """
-    path.parent.mkdir(exist_ok=True)
-    video = [f for f in frames(*paths, seconds=60) if first - 0.001 <= f.time < last - 0.001]
+    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("wb") as file:
-        writer = TrackWriter(JSON_LINES, file, SourceVideo("v.mp4", 1280, 720))
-        for index, frame in enumerate(video):
+        size = round(1280 * scale), round(720 * scale)
+        writer = TrackWriter(JSON_LINES, file, SourceVideo("v.mp4", *size))
+        for index in range(round((last - first) * 25)):
             time = index / 25
+            feet = {n: foot for n, p in enumerate(paths, 1) if (foot := p(round(first + time, 4)))}
+            tracks = tuple(
+                track((scale * x, scale * y), n, height=round(scale * height), name=kind)
+                for n, (x, y) in feet.items()
+            )
             begins = (CLOCK + timedelta(seconds=clock + time)).isoformat()
             facts = {"clock": begins} if clock >= 0 else {}
-            writer.write(FrameTracks(index, time, frame.tracks, facts))
+            writer.write(FrameTracks(index, time, tracks, facts))
         writer.end()
     return path
 
@@ -86,15 +104,17 @@ def test_clocks_have_whole_seconds(tmp_path: File, begin: str) -> None:
     assert row.count == 1
 
 
-OTHERS = ["b.jsonl", "v_20260501_070000_2.jsonl", "v_20260501_080000.jsonl"]
+def flows_of(videos: Sequence[Counts]) -> list[tuple[str, str | None, int]]:
+    return [(row.origin, row.destination, row.count) for row in flow_table(videos)]
 
 
-@pytest.mark.parametrize("second", OTHERS)
+ONE_VEHICLE, TWO_VEHICLES = [("west", "east", 1)], [("west", None, 1), ("east", None, 1)]
+
+
+@pytest.mark.parametrize("second", ["b.jsonl", "v_20260501_080000.jsonl"])
 def test_files_that_do_not_follow_have_vehicles_of_their_own(tmp_path: File, second: str) -> None:
     videos = count(write_halves(tmp_path, [FOLLOWING[0], second], GOES_EAST))
-    assert [(row.origin, row.destination) for row in flow_table(videos)] == [
-        ("west", None), ("east", None),
-    ]  # fmt: skip
+    assert flows_of(videos) == TWO_VEHICLES
     numbers = [{event.vehicle for event in video.events} for video in videos]
     assert not numbers[0] & numbers[1]
 
@@ -137,28 +157,135 @@ def test_exact_clocks_show_a_short_gap(tmp_path: File) -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "is_joined"),
+    ("first", "second", "pattern"),
     [
-        ("20260501_070000_000123NF", "20260501_070010_000124NF", True),
-        ("20260501_070000_000123NF", "20260501_070010_000124NR", False),
-        ("cam1_20260501_070000", "cam2_20260501_070010", False),
-        ("1001_20260501_070000", "1002_20260501_070010", False),
-        ("20260501_070000_cam1", "20260501_070010_cam2", False),
-        ("20260501_070000", "rear/20260501_070010", False),
-        ("2026-05-01/20260501_070000", "2026-05-02/20260501_070010", True),
+        ("20260501_070000_000123NF", "20260501_070010_000124NR", None),
+        ("20260501_070000_NF", "20260501_070010_EF", None),
+        ("20260501_070000_PF", "20260501_070010_NF", None),
+        (
+            "RecM05_20260501_070000_070006_6D28808_1A468F9",
+            "RecM05_20260501_070010_070016_6D28808_2C468F1",
+            None,
+        ),
+        (
+            "RecentClips/2026-05-01_07-00-00-front",
+            "SavedClips/2026-05-01_07-03-12/2026-05-01_07-00-10-front",
+            None,
+        ),
+        ("2026-05-01/20260501_070000", "2026-05-02/20260501_070010", None),
+        ("2026-05-01/07/cam/00.00", "2026-05-01/07/cam/00.10", "%Y-%m-%d/%H/cam/%M.%S"),
+        (
+            "2026-05-01/001/dav/07/07.00.00-07.00.10[M][0@0][0]",
+            "2026-05-01/001/dav/07/07.00.10-07.00.20[M][0@0][0]",
+            "%Y-%m-%d/001/dav/%H/%H.%M.%S",
+        ),
+        ("1777618800.123456-ab12cd", "1777618810.654321-ef34", "in the file"),
+        ("a", "copy of b (1)", "in the file"),
+        ("video", "video (1)", "in the file"),
+        ("part1", "part2", "in the file"),
+        ("cam1_9", "cam1_10", "in the file"),
+        ("b", "a", "in the file"),
     ],
 )
-def test_only_files_of_one_camera_are_joined(
-    tmp_path: File, first: str, second: str, is_joined: bool
+def test_names_are_only_read_for_clocks(
+    tmp_path: File, first: str, second: str, pattern: str | None
+) -> None:
+    has_clock = pattern == "in the file"
+    files = [
+        write_part(tmp_path / f"{name}.jsonl", start, start + 10, GOES_EAST, clock=clock)
+        for name, start, clock in (
+            (first, 0, 0 if has_clock else -1),
+            (second, 10, 10 if has_clock else -1),
+        )
+    ]
+    clock = ClockSettings(pattern=None if has_clock else pattern)
+    camera = SETTINGS.camera.model_copy(update={"clock": clock})
+    settings = SETTINGS.model_copy(update={"camera": camera})
+    for order in (files, files[::-1]):
+        videos = count_files(order, settings)
+        assert list(videos) == list(map(str, files)), "in the order of time"
+        assert flows_of(list(videos.values())) == ONE_VEHICLE
+
+
+def test_files_without_a_clock_are_in_the_order_of_their_numbers() -> None:
+    names = ["a/clip2", "a/clip10", "b/GX010016", "b/GX020016", "b/GOPR0017", "b/GP010017"]
+    names += ["b/GX010018", "b/gx020018", "B/GX010019"]
+    paths = [File(f"{name}.MP4.jsonl") for name in names]
+    assert sorted(set(paths), key=natural_order) == paths
+
+
+def test_a_begin_chains_files_in_the_order_of_their_numbers(tmp_path: File) -> None:
+    names = [f"clip{number}.jsonl" for number in range(1, 13)]
+    files = [write_part(tmp_path / name, 2 * n, 2 * n + 2) for n, name in enumerate(names)]
+    settings = SETTINGS.model_copy(update={"input": InputSettings(begin="2026-01-02 03:04Z")})
+    videos = count_files(sorted(files), settings)
+    begins = [(File(name).name, str(counts.clock)[17:19]) for name, counts in videos.items()]
+    assert begins == [(name, f"{2 * n:02}") for n, name in enumerate(names)]
+
+
+def test_files_without_a_clock_are_counted_on_their_own_after_the_others(tmp_path: File) -> None:
+    files = [
+        write_part(tmp_path / name, first, first + 10, GOES_EAST)
+        for name, first in (("a.jsonl", 0), *zip(FOLLOWING, (0, 10), strict=True), ("b.jsonl", 10))
+    ]
+    videos = count_files(files, SETTINGS)
+    assert [File(name).name for name in videos] == [*FOLLOWING, "a.jsonl", "b.jsonl"]
+    assert flows_of(list(videos.values())) == [
+        ("west", "east", 1), ("west", None, 1), ("east", None, 1),
+    ]  # fmt: skip
+
+
+def test_tracks_of_two_files_that_share_an_id_are_two(tmp_path: File) -> None:
+    halves = zip(FOLLOWING, ((0, "truck", 90), (10, "car", 60)), strict=True)
+    files = [
+        write_part(tmp_path / name, first, first + 10, GOES_EAST, kind=kind, height=height)
+        for name, (first, kind, height) in halves
+    ]
+    videos = count(files)
+    assert flows_of(videos) == ONE_VEHICLE
+    events = [(event.class_name, event.id) for video in videos for event in video.events]
+    assert events == [("truck", 1), ("truck", 1)], "the class that shows it largest, ids of files"
+
+
+OVERLAPPING = [FOLLOWING[0], "v_20260501_070005.jsonl"]
+
+
+@pytest.mark.parametrize("other", [GOES_EAST, through((5, 700, 300), (15, 200, 300))])
+def test_an_overlap_with_other_vehicles_is_an_error(tmp_path: File, other: Path) -> None:
+    files = [
+        write_part(tmp_path / OVERLAPPING[0], 0, 10, GOES_EAST),
+        write_part(tmp_path / OVERLAPPING[1], 8, 18, other),
+    ]
+    fault = f"{files[1]}: begins 5.0 s before the end of {files[0]} by their clocks, but shows "
+    with pytest.raises(TruthError, match=re.escape(fault)):
+        count(files)
+
+
+def test_an_overlap_without_vehicles_loses_nothing(
+    tmp_path: File, caplog: pytest.LogCaptureFixture
+) -> None:
+    parked = through((0, 300, 650), (60, 300, 650))
+    late = through((10.1, 100, 400), (16, 1100, 400))
+    files = [
+        write_part(tmp_path / OVERLAPPING[0], 0, 10, parked),
+        write_part(tmp_path / OVERLAPPING[1], 5, 18, parked, late),
+    ]
+    videos = count(files)
+    assert (flows_of(videos), caplog.messages) == (ONE_VEHICLE, [])
+    assert videos[1].spans == ((5, 12.96),)
+
+
+def test_no_vehicle_continues_over_a_change_of_frame_size(
+    tmp_path: File, caplog: pytest.LogCaptureFixture
 ) -> None:
     files = [
-        write_part(tmp_path / f"{first}.jsonl", 0, 10, GOES_EAST),
-        write_part(tmp_path / f"{second}.jsonl", 10, 20, GOES_EAST),
+        write_part(tmp_path / FOLLOWING[0], 0, 10, GOES_EAST),
+        write_part(tmp_path / FOLLOWING[1], 10, 20, GOES_EAST, scale=0.5),
     ]
-    rows = flow_table(count(files))
-    assert [(r.origin, r.destination) for r in rows] == (
-        [("west", "east")] if is_joined else [("west", None), ("east", None)]
-    )
+    assert flows_of(count(files)) == TWO_VEHICLES
+    again = write_part(tmp_path / "v_20260501_070004.jsonl", 4, 14, GOES_EAST, scale=0.5)
+    assert flows_of(count([files[0], again])) == [("west", None, 1)]
+    assert "begins 6.0 s before the end of" in caplog.text
 
 
 @pytest.mark.parametrize("repeated", [1, 2, 3, 10, 12])

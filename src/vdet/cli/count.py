@@ -59,9 +59,9 @@ def count(
 ) -> int:
     """Count the vehicles of track files at lines and in zones.
 
-    TRACKS are files of vdet detect-video --tracks. Vehicles are not detected again, and the counts
-    are the same as those of detect-video --counts. If the clock times of TRACKS follow one another,
-    a vehicle in two of them counts once.
+    TRACKS are files of vdet detect-video --tracks, of one camera. Vehicles are not detected again,
+    and the counts are the same as those of detect-video --counts. If the clock times of TRACKS
+    follow one another, a vehicle in two of them counts once.
 
     \b
     Examples:

@@ -133,12 +133,15 @@ class ClockSettings(Section):
         if self.pattern is None:
             return _usual_time(path.name)
         parts = re.findall(r"%[a-zA-Z]|[^%]", self.pattern, re.DOTALL)
-        form = "".join(_CODES.get(part) or re.escape(part) for part in parts)
+        codes = [part for part in parts if part in _CODES]
+        form = "".join(f"({_CODES[part]})" if part in codes else re.escape(part) for part in parts)
         name = "/".join(path.absolute().parts[-1 - self.pattern.count("/") :])
         zone = "Z" if "%SZ" in self.pattern else ""
-        for text in re.findall(f"(?=({form}))", name, re.ASCII):
+        for match in re.finditer(f"(?={form})", name, re.ASCII):
+            values = dict(zip(codes, match.groups(), strict=True))  # folders may repeat the hour
             with suppress(ValueError):
-                return parse_date_time(datetime.strptime(text, self.pattern).isoformat() + zone)
+                time = datetime.strptime(" ".join(values.values()), " ".join(values))
+                return parse_date_time(time.isoformat() + zone)
         return None
 
 

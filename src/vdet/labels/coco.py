@@ -276,7 +276,12 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     return saved.of_video(video) if video else saved
 
 
-COCO = Format("COCO", ".coco.json", read_coco, whole=_write)
+def _read_head(path: Path, data: bytes) -> SavedTracks:
+    """Read what `_write` puts first: the video."""
+    return read_coco(path, data.rstrip() + b'], "images": []}')
+
+
+COCO = Format("COCO", ".coco.json", read_coco, whole=_write, read_head=_read_head)
 
 
 def read_coco_images(path: Path) -> Iterator[LabelledImage]:

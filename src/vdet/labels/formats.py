@@ -51,6 +51,8 @@ class Format:
         the first line of the file.
     whole
         For a format that is written at the end: function that writes all frames of a video.
+    read_head
+        Function like `read` for the first lines of a file; None if they have no times.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Format:
     lines: Callable[[FrameTracks], Iterable[str]] | None = None
     heading: str = ""
     whole: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
+    read_head: Callable[[Path, bytes], SavedTracks] | None = None
 
 
 VIDEO, FINDINGS, LAST = "video", "findings", "last"

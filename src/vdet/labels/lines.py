@@ -13,6 +13,7 @@ import logging
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -153,8 +154,8 @@ def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     yield text.getvalue()
 
 
-def read_json_lines(path: Path, data: bytes) -> SavedTracks:
-    """Read a record for every frame; unknown keys are ignored.
+def read_json_lines(path: Path, data: bytes, *, is_head: bool = False) -> SavedTracks:
+    """Read a record for every frame, or of the first ones; unknown keys are ignored.
 
     Raises
     ------
@@ -177,7 +178,7 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         labels += [box.label(line, last) for box in record.tracks]
     if first is None:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    if first.last is False and not is_whole:
+    if first.last is False and not (is_whole or is_head):
         raise TruthError(f"{path}: is cut off after frame {last}; copy or write it again")
     seconds, begin = checked_times(path, times), _begin(path, times[first.frame], first.clock)
     saved = SavedTracks(tuple(labels), tuple(seconds), seconds, begin=begin)
@@ -244,8 +245,14 @@ def _begin(path: Path, first: tuple[int | str, float], clock: str | None) -> dat
         raise line_error(path, position, f"clock: {error}") from error
 
 
-JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
-CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n")
+JSON_LINES = Format(
+    "JSON lines",
+    ".jsonl",
+    read_json_lines,
+    _json_lines,
+    read_head=partial(read_json_lines, is_head=True),
+)
+CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n", read_head=read_csv)
 
 
 _log = logging.getLogger("vdet")

@@ -4,6 +4,7 @@ import gc
 import logging
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -59,6 +60,26 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
     for finding in warnings_in(saved.findings):
         _log.warning("%s: %s", path, finding)
     return saved if rate is None else saved.at_rate(rate)
+
+
+_HEAD_LINES, _MAX_LINE = 3, 1_000_000
+"""Number of lines of a head, and maximum bytes of each."""
+
+
+def read_head(path: Path) -> SavedTracks:
+    """Return the first frames of a file, and what they say of its video, from its first lines.
+
+    It is empty if they say nothing, or are wrong: `read_tracks` says so.
+    """
+    lines: list[bytes] = []
+    if path.is_file():  # else it can be read only once, or `read_tracks` says what is wrong
+        with suppress(OSError), path.open("rb") as file:
+            lines = [file.readline(_MAX_LINE) for _ in range(_HEAD_LINES)]
+    with suppress(TruthError):
+        form = recognize(path, b"".join(lines))
+        if form.read_head:
+            return form.read_head(path, b"".join(lines))
+    return SavedTracks(())
 
 
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:

@@ -215,8 +215,10 @@ def when(spans: Sequence[Span]) -> str:
 
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_JOINED = 2.0
-"""Maximum seconds from the last frame of a video to the first of the next one, without a gap."""
+SEAM = 2.0
+"""Maximum seconds by the clocks from the last frame of a video to the first of the next one, if
+that continues it: clocks of whole seconds differ by up to one, and so long may a frame last.
+"""
 _MAX_COUNT = 200_000
 """Maximum number of intervals: two days of seconds."""
 
@@ -302,7 +304,7 @@ class Intervals:
         self._every = [span for spans in self._spans for span in spans]
         self._observed: list[Span] = []
         for first, last in sorted(self._every):
-            if self._observed and first - self._observed[-1][1] <= _JOINED:
+            if self._observed and first - self._observed[-1][1] <= SEAM:
                 begin, end = self._observed.pop()
                 first, last = begin, max(end, last)  # noqa: PLW2901
             self._observed.append((first, last))

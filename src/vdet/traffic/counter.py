@@ -93,10 +93,13 @@ class VehicleCounter:
             events = (event for passage in ended for event in passage.events)
             self._ended_counts.update((event.name, event.direction) for event in events)
 
-    def start_video(self) -> None:
-        """Treat the ids of the next frames as other tracks, because they are of another video."""
+    def start_video(self) -> int:
+        """Treat the ids of the next frames as other tracks, because they are of another video.
+
+        Returns what `Event.id` is larger by.
+        """
         self._latest = None
-        self.linker.start_video()
+        return self.linker.start_video()
 
     def counts(self) -> Counts:
         """Return all results, as if the video ended now."""

@@ -51,7 +51,7 @@ parked vehicles need no memory.
 """
 _COLUMNS = 10
 """Numbers stored for a frame: time, x and y of the ground point, x1 and y1 of the box, score,
-number of the frame, id of the track, x2 and y2 of the box.
+number of the frame, key of the track, x2 and y2 of the box.
 """
 _ROW = Struct(f"{_COLUMNS}d")
 
@@ -75,7 +75,8 @@ class VehiclePath:
     heights
         Heights of its box, pixels.
     scores, frames, ids
-        Scores and ids of its tracks, and numbers of the frames.
+        Scores and ids of its tracks, and numbers of the frames. Of a later video, ids are larger by
+        what `TrackLinker.start_video` returned.
     size
         Maximum of the mean of width and height of its box, pixels.
     """
@@ -127,7 +128,8 @@ class TrackLinker:
         self.started = started
         self._size = width, height
         self._now = -math.inf
-        self._vehicles: dict[int, _Vehicle] = {}  # by the id of the track
+        self._vehicles: dict[int, _Vehicle] = {}  # by the id of the track, and its video
+        self._id_shift, self._largest = 0, -1  # of all ids
 
     def add(self, frame: FrameTracks) -> list[VehiclePath]:
         """Add the next frame; return the paths that have ended."""
@@ -135,26 +137,30 @@ class TrackLinker:
         oldest = self._now - _KEEP_SECONDS
         ended = [key for key, vehicle in self._vehicles.items() if vehicle.last_seen < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
-        shown = {track.id for track in frame.tracks}
-        lost = {} if shown <= self._vehicles.keys() else self._lost(shown)
-        for track in frame.tracks:
-            vehicle, foot = self._vehicles.get(track.id), track.foot
+        tracks = {track.id + self._id_shift: track for track in frame.tracks}
+        lost = {} if tracks.keys() <= self._vehicles.keys() else self._lost(tracks)
+        for key, track in tracks.items():
+            vehicle, foot = self._vehicles.get(key), track.foot
             is_far = vehicle and math.dist(foot, vehicle.foot) > vehicle.box.height
             if vehicle and is_far and vehicle.is_jump(track, self._now, *self._size):
-                self._vehicles[-vehicle.number] = self._vehicles.pop(track.id)
+                self._vehicles[-vehicle.number] = self._vehicles.pop(key)
                 vehicle = None
-            vehicle = vehicle or self._begin(track, lost)
-            vehicle.add(track, foot, self._now, frame.index)
+            vehicle = vehicle or self._begin(key, track, lost)
+            vehicle.add(key, track, foot, self._now, frame.index)
             if vehicle.returned is not None and vehicle.has_turned():
                 self.started += 1
-                self._vehicles[track.id] = vehicle.split(self.started)
+                self._vehicles[key] = vehicle.split(self.started)
                 paths.append(vehicle.path(self._now))
-            self._vehicles[track.id].classes[track.id] = track.class_name
+            self._vehicles[key].classes[key] = track.class_name
         return paths
 
-    def start_video(self) -> None:
-        """Treat the ids of the next frames as other tracks, because they are of another video."""
-        self._vehicles = {-vehicle.number: vehicle for vehicle in self._vehicles.values()}
+    def start_video(self) -> int:
+        """Treat the ids of the next frames as other tracks, because they are of another video.
+
+        Returns what ids in paths are larger by.
+        """
+        self._id_shift = self._largest + 1
+        return self._id_shift
 
     def open_paths(self) -> list[VehiclePath]:
         """Return the paths so far of the vehicles that may be shown again."""
@@ -178,23 +184,24 @@ class TrackLinker:
                 lost[key] = points
         return lost
 
-    def _begin(self, track: Track, lost: Mapping[int, list[Point]]) -> "_Vehicle":
+    def _begin(self, key: int, track: Track, lost: Mapping[int, list[Point]]) -> "_Vehicle":
         """Return the nearest lost vehicle that the track continues, or a new one."""
         point, height = track.written_foot, track.box.xywh[3]
         distances = {}
-        for key, points in lost.items():
-            if key not in self._vehicles:  # another track continues it
+        for old, points in lost.items():
+            if old not in self._vehicles:  # another track continues it
                 continue
-            low, high = sorted((height, self._vehicles[key].box.xywh[3]))
+            low, high = sorted((height, self._vehicles[old].box.xywh[3]))
             distance = min(math.dist(point, position) for position in points)
             if high <= _MAX_GROWTH * low and distance <= _MAX_DISTANCE * high:
-                distances[key] = distance
+                distances[old] = distance
         if distances:
             vehicle = self._vehicles.pop(min(distances, key=distances.__getitem__))
         else:
             self.started += 1
             vehicle = _Vehicle(self.started, track.box, track.foot, self._now)
-        self._vehicles[track.id] = vehicle
+        self._vehicles[key] = vehicle
+        self._largest = max(self._largest, key)
         return vehicle
 
 
@@ -225,13 +232,13 @@ class _Vehicle:
     size: float = 0.0
     returned: int | None = None
 
-    def add(self, track: Track, foot: Point, time: float, frame: int) -> None:
+    def add(self, key: int, track: Track, foot: Point, time: float, frame: int) -> None:
         """Add the next frame that shows it."""
         if time - self.last_seen > _HIDDEN_SECONDS:
             self.returned = len(self.rows)
         self.box = box = track.box
         self.foot, self.last_seen, (x, y) = foot, time, foot
-        row = _ROW.pack(time, x, y, box.x1, box.y1, track.score, frame, track.id, box.x2, box.y2)
+        row = _ROW.pack(time, x, y, box.x1, box.y1, track.score, frame, key, box.x2, box.y2)
         self.rows.frombytes(row)  # three times faster than `extend`
         if len(self.rows) % (_PARKED_ROWS * _COLUMNS) == 0 and self.returned is None:
             latest = _table(self.rows[-_PARKED_ROWS * _COLUMNS :])

@@ -15,7 +15,7 @@ from vdet.config.shapes import NOWHERE
 from vdet.errors import ConfigError, counted
 from vdet.traffic import counts as tables
 from vdet.traffic import measures
-from vdet.traffic.clock import ClockTime, Interval, Intervals
+from vdet.traffic.clock import SEAM, ClockTime, Interval, Intervals
 from vdet.traffic.counts import Counts, Event, ZoneRow, class_of
 from vdet.traffic.estimate import Estimate
 from vdet.traffic.workbook import Cell, Sheet, SheetTable
@@ -28,8 +28,6 @@ _PEAK = "peak hour", "vehicles in it", "peak hour factor"
 _ESTIMATE = "class", "counted", "estimated", "at least", "at most"
 _SPEEDS = "median km/h", "85 % km/h"
 _ALL = "all"
-_JOINED = 2.0
-"""Maximum seconds from the last frame of a file to the first of the next one, without a gap."""
 _NOTES = f"""\
 part: there is no video in more than a second of the interval. Per hour: of the time observed.
 peak hour: the four successive quarters of an hour, all observed, with the most vehicles. Its \
@@ -304,6 +302,6 @@ def _seam(before: Interval | None, file: Interval) -> str | None:
     if not (before and isinstance(before.end, datetime) and isinstance(file.start, datetime)):
         return None
     gap = (file.start - before.end).total_seconds()
-    if abs(gap) <= _JOINED:
+    if abs(gap) <= SEAM:
         return "continues"
     return f"gap of {gap:.0f} s" if gap > 0 else f"begins {-gap:.0f} s before its end"
