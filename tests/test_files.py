@@ -3,27 +3,22 @@
 import itertools
 import os
 import resource
+import signal
 import subprocess
 import sys
 import tracemalloc
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from publishing import at_system_call, make_older, publish, texts, without_links
+from running import with_modules
 from vdet.errors import ConfigError, OutputError, printable
-from vdet.files import (
-    _HOST,
-    OutputFiles,
-    file_ids,
-    read_whole,
-    staged,
-)
+from vdet.files import _HOST, ENDING_SIGNALS, OutputFiles, file_ids, read_whole, staged
 
 DIGITS = "1a2b3c4d" * 2
 
@@ -45,10 +40,6 @@ def test_a_file_appears_when_the_block_ends_and_replaces_an_older_one_only_if_as
         if not overwrite:
             path.chmod(0o440)
     assert path.stat().st_mode & 0o777 == 0o440
-
-
-def without_links(*_: object, **__: object) -> None:
-    raise PermissionError(1, "Operation not permitted")
 
 
 @pytest.mark.parametrize("has_links", [True, False])
@@ -134,44 +125,111 @@ class TestOutputFiles:
         assert names(tmp_path) == ["2.txt", "3.txt"]
         assert (tmp_path / "2.txt").read_text() == "old"
 
-    @pytest.mark.parametrize("has_links", [True, False])
-    def test_an_interrupt_at_any_moment_leaves_all_files_new_or_all_as_they_were(
-        self, has_links: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+
+@pytest.fixture
+def default_signals() -> Iterator[None]:
+    """Ctrl-C raises `KeyboardInterrupt`, and what the test sets is undone."""
+    handlers = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def no_sync(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are not synced, which takes long and matters only when the power fails."""
+    monkeypatch.setattr("os.fsync", lambda _: None)
+
+
+def fail() -> None:
+    raise OSError(5, "Input/output error")
+
+
+ONCE = partial(signal.raise_signal, signal.SIGINT)
+
+
+def twice() -> None:
+    ONCE()
+    ONCE()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # `os.scandir`
+@pytest.mark.usefixtures("default_signals", "no_sync")
+class TestAtEverySystemCall:
+    """What happens after any system call of publishing leaves no name without its file."""
+
+    @pytest.mark.parametrize(
+        ("act", "is_last", "has_links"),
+        [
+            *((fail, False, True), (fail, False, False)),
+            *((ONCE, False, True), (ONCE, True, True)),
+            *((twice, False, True), (twice, False, False)),
+        ],
+    )
+    def test_an_error_or_a_signal_leaves_all_files_new_or_all_as_they_were(
+        self,
+        act: Callable[[], object],
+        is_last: bool,
+        has_links: bool,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         if not has_links:
             monkeypatch.setattr("os.link", without_links)
-        before = dict.fromkeys(["1.txt", "2.txt", "of-an-earlier-run.txt"], "old")
-        after = dict.fromkeys(["0.txt", "1.txt", "2.txt", "3.txt"], "new")
-        for moment in itertools.count():
-            folder = tmp_path / str(moment)
-            folder.mkdir()
-            for name in before:
-                (folder / name).write_text("old")
-            files = OutputFiles(overwrite=True)
-            into = files.stage_folder(folder, is_text)
-            for name in after:
-                (into / name).write_text("new")
-            with monkeypatch.context() as patch, suppress(KeyboardInterrupt), files:
-                interrupt_after(moment, folder, patch)
-            found = {path.name: path.read_text() for path in folder.iterdir()}
-            assert found in (before, after)
-            if found == after:
+        before = texts(make_older(tmp_path / "before"))
+        publish(make_older(tmp_path / "after"))
+        after = texts(tmp_path / "after")
+        event, outcomes = "c_call" if act is fail else "c_return", []
+        for number in itertools.count():
+            folder, raised = make_older(tmp_path / str(number)), False
+            acts: list[bool] = []
+
+            def act_once(acts: list[bool] = acts) -> None:
+                acts.append(True)
+                act()
+
+            try:
+                with at_system_call(number, act_once, event=event) as begin:
+                    publish(folder, is_last=is_last, before=begin)
+            except (KeyboardInterrupt, OSError):
+                raised = True
+            found = texts(folder)
+            outcomes.append((found == after, raised))
+            if act is not ONCE:  # temporary files may be left, for the next run to remove
+                found = {name: text for name, text in found.items() if ".vdet-" not in name}
+            assert found in (before, after), f"after {number} calls"
+            if not acts:
                 break
-        assert moment > 5
+        waited = [(True, not is_last)] if act is ONCE else []
+        assert set(outcomes) >= {(False, True), *waited, (True, False)}
+        assert not (is_last and (True, True) in outcomes)
 
+    @pytest.mark.parametrize("options", [[], ["--no-links"]])
+    def test_a_kill_leaves_each_file_as_it_was_or_new_also_after_the_next_run(
+        self, options: list[str], tmp_path: Path
+    ) -> None:
+        command = [sys.executable, "-m", "publishing", str(tmp_path), *options]
+        subprocess.run(command, env=with_modules(Path(__file__).parent), check=True)
+        folders = sorted(tmp_path.iterdir(), key=lambda path: int(path.name))
+        before, after = texts(make_older(tmp_path / "before")), texts(folders[-1])
+        assert texts(folders[0]).items() >= before.items()
+        for folder in folders[:-1]:
+            for run in (list, partial(self.write_another, folder)):
+                run()
+                found = texts(folder)
+                for name in before | after:
+                    text = found.get(name)
+                    assert text in (before.get(name), after.get(name)), (folder.name, name, text)
+            publish(folder)
+            (folder / "another.csv").unlink()
+            assert texts(folder) == after
+        assert len(folders) > 80
 
-def interrupt_after(steps: int, folder: Path, patch: pytest.MonkeyPatch) -> None:
-    """Raise a `KeyboardInterrupt` after so many steps and one that change what `folder` holds."""
-    stop = iter([False] * steps + [True])
-
-    def interrupted(step: Callable[..., object], *values: Any, **options: Any) -> object:
-        result = step(*values, **options)
-        if folder in {Path(value).parent for value in values} and next(stop, False):
-            raise KeyboardInterrupt
-        return result
-
-    for name in ("link", "replace", "unlink"):
-        patch.setattr(os, name, partial(interrupted, getattr(os, name)))
+    @staticmethod
+    def write_another(folder: Path) -> None:
+        with staged(folder / "another.csv"):
+            pass
 
 
 @pytest.mark.parametrize("overwrite", [True, False])
@@ -183,7 +241,7 @@ def test_an_input_is_rejected_as_an_output_under_each_of_its_names(
     (tmp_path / "link.json").symlink_to("hard.json")
     inputs = file_ids([tmp_path / "in.json", tmp_path / "missing"])
     for name in ("in.json", "hard.json", "link.json"):
-        with pytest.raises(OutputError, match="is the input itself"):
+        with pytest.raises(OutputError, match="is an input of this run"):
             OutputFiles(overwrite=overwrite, inputs=inputs).check(tmp_path / name)
     OutputFiles(overwrite=True).check(tmp_path / "in.json")
 
@@ -195,7 +253,7 @@ def test_no_output_replaces_an_input(tmp_path: Path) -> None:
     files = OutputFiles(overwrite=True, inputs=inputs)
     for path in (tmp_path / "0.txt", tmp_path / "a.txt"):
         files.stage(path).write_text("new")
-    with pytest.raises(OutputError, match=r"a\.txt: is the input itself"), files:
+    with pytest.raises(OutputError, match=r"a\.txt: is an input of this run"), files:
         pass
     with OutputFiles(overwrite=True, inputs=inputs) as files:
         (files.stage_folder(tmp_path, is_text) / "0.txt").write_text("new")
@@ -279,6 +337,7 @@ class TestFolder:
         def write(overwrite: bool) -> None:
             with OutputFiles(overwrite=overwrite) as files:
                 (files.stage_folder(tmp_path, is_text) / "a.txt").write_text("new")
+                files.stage(tmp_path / "b.csv").write_text("of the same run, beside the folder's")
 
         with pytest.raises(OutputError, match=r"a\.txt: appeared during the run"):
             write(overwrite=False)
@@ -286,8 +345,10 @@ class TestFolder:
         assert names(tmp_path) == [*kept, "of-an-earlier-run.txt"]
         assert (tmp_path / "a.txt").read_text() == "old"
         write(overwrite=True)
-        assert names(tmp_path) == kept
+        assert names(tmp_path) == sorted([*kept, "b.csv"])
         assert (tmp_path / "a.txt").read_text() == "new"
+        write(overwrite=True)
+        assert names(tmp_path) == sorted([*kept, "b.csv"])
 
     @pytest.mark.parametrize("is_old", [True, False])
     def test_a_failed_run_leaves_no_folder_of_its_own(self, tmp_path: Path, is_old: bool) -> None:

@@ -1,9 +1,10 @@
 """Files: outputs appear only when they are complete, and never replace an input.
 
-Outputs are written into temporary folders beside their destination, named `.vdet-`, the host, and
-16 digits. The writer holds a lock on its folder, which the system releases when the process ends,
-however it ends. A shared file system may not show the locks of other hosts, so the files of a
-killed run are removed by the next run on the same host.
+Outputs are written into temporary folders in the nearest folder of their destination that exists,
+named `.vdet-`, the host, and 16 digits. The writer holds a lock on its folder, which the system
+releases when the process ends, however it ends. A shared file system may not show the locks of
+other hosts, so the files of a killed run are removed by the next run on the same host: nothing in a
+temporary folder is the only copy of an older file.
 """
 
 import contextlib
@@ -13,8 +14,10 @@ import os
 import platform
 import re
 import shutil
+import signal
 import stat
 import sys
+import threading
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any, Self
@@ -23,7 +26,10 @@ from vdet.errors import OutputError, VdetError
 
 _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
 _TEMPORARY = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
-_ASIDE = ".older"  # folder in a temporary one, for files that are replaced
+_ASIDE = ".older"  # folder in a temporary one, for second names of files that are replaced
+
+ENDING_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+"""The signals that end the program: of Ctrl-C, of `kill`, and of a terminal that closes."""
 
 FileIds = frozenset[tuple[int, int]]
 """Files by their device and inode, which are the same for all names of a file."""
@@ -55,9 +61,10 @@ class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
     When the block ends without an error, all staged files are synced to disk and then renamed, in
-    the order in which their folders were staged. If it ends with an error or is interrupted, none
-    appears, and every older file is unchanged. Missing folders are created, and removed again after
-    an error.
+    the order in which their folders were staged; missing folders are created. If it ends with an
+    error or is interrupted, none appears, and every older file is unchanged. If the process is
+    killed, each name still has its complete older or its complete new file. Without hard links,
+    older files are copied for this.
 
     Parameters
     ----------
@@ -66,6 +73,10 @@ class OutputFiles:
         target. Otherwise every existing file is kept, also one that appears during the run.
     inputs
         The files that the run reads, which are never replaced: see `vdet.run.inputs`.
+    is_last
+        The program writes nothing after these files: a signal to end it that comes while they are
+        renamed, or later, is ignored. Without it, such a signal waits until they are renamed. A
+        second one always acts at once.
 
     Raises
     ------
@@ -73,13 +84,23 @@ class OutputFiles:
         A file cannot be created, synced or renamed, or an existing one must be kept.
     """
 
-    def __init__(self, *, overwrite: bool = False, inputs: FileIds = NO_FILES) -> None:
+    def __init__(
+        self, *, overwrite: bool = False, inputs: FileIds = NO_FILES, is_last: bool = False
+    ) -> None:
         self._overwrite = overwrite
         self._inputs = inputs
+        self._is_last = is_last
+        self._claimed: set[Path] = set()
+        self._staged: set[Path] = set()  # single files, by their final names
         self._folders: dict[Path, Path] = {}  # temporary folders by destination
         self._is_earlier: dict[Path, Callable[[Path], bool]] = {}
-        self._new_folders: list[Path] = []  # outermost first
         self._cleanup = contextlib.ExitStack()
+
+    def claim(self, path: Path) -> None:
+        """Keep a path for one output. Raises `OutputError` if it is already that of another."""
+        if path.resolve() in self._claimed:
+            raise OutputError(f"{path}: is used for two outputs; rename one")
+        self._claimed.add(path.resolve())
 
     def check(
         self,
@@ -89,7 +110,7 @@ class OutputFiles:
         noun: str = "outputs",
         makes_folder: bool = False,
     ) -> None:
-        """Check that an output can be written, before any work is done.
+        """Check that an output can be written, before any work is done, and claim its path.
 
         Parameters
         ----------
@@ -103,9 +124,10 @@ class OutputFiles:
         Raises
         ------
         OutputError
-            `path` has another suffix, is an input, a folder, or already exists (without
-            `overwrite`), or its folder cannot be written to.
+            `path` has another suffix, is an input, a folder, another output, or already exists
+            (without `overwrite`), or its folder cannot be written to.
         """
+        self.claim(path)
         if suffixes and path.suffix.lower() not in suffixes:
             raise OutputError(f"{path}: {noun} must end in {', '.join(suffixes)}")
         if os.path.isdir(path):  # noqa: PTH112  # a name that is too long fails later
@@ -125,7 +147,10 @@ class OutputFiles:
 
     def _check_replaceable(self, path: Path) -> None:
         if _id(path) in self._inputs:
-            raise OutputError(f"{path}: is the input itself; use another output")
+            raise OutputError(f"{path}: is an input of this run; use another output")
+        is_earlier = self._is_earlier.get(path.parent)
+        if is_earlier and path not in self._staged and not is_earlier(path):
+            raise OutputError(f"{path}: was not written by vdet and will not be replaced")
         if not (path.is_file() or path.is_symlink()):
             raise OutputError(
                 f"{path}: is not a regular file and will not be replaced; use another output"
@@ -134,12 +159,12 @@ class OutputFiles:
     def stage(self, path: Path) -> Path:
         """Return an empty temporary file of the same name that will become `path`.
 
-        It is in a temporary folder beside `path`. Temporary folders left there by killed runs are
-        removed.
+        It is in a temporary folder. Temporary folders left by killed runs are removed.
         """
         with output_errors(path):
             temporary = self._temporary_folder(path.parent) / path.name
             temporary.touch()
+        self._staged.add(path)
         return temporary
 
     def stage_folder(self, path: Path, is_earlier: Callable[[Path], bool] | None = None) -> Path:
@@ -148,9 +173,9 @@ class OutputFiles:
         Parameters
         ----------
         is_earlier
-            Whether an earlier run wrote a file. With `overwrite`, the regular files in `path` for
-            which it is true, and which this run did not write, are removed at the end. None: keep
-            all.
+            Whether an earlier run wrote a file. With `overwrite`, only such files are replaced, and
+            those that this run did not write are removed at the end. None: all are replaced, none
+            is removed.
         """
         if is_earlier:
             self._is_earlier[path] = is_earlier
@@ -164,15 +189,12 @@ class OutputFiles:
 
     def _temporary_folder(self, path: Path) -> Path:
         if path not in self._folders:
-            missing = [item for item in (path, *path.parents) if not item.exists()]
-            self._new_folders += reversed(missing)
-            path.mkdir(parents=True, exist_ok=True)
-            remove_stale(path)
             # Each lock keeps a file open, so those of thousands of folders share one.
             outer = next(
                 (self._folders[item] for item in path.parents if item in self._folders), None
             )
-            if outer and outer.stat().st_dev == path.stat().st_dev:
+            if outer and outer.stat().st_dev == _existing(path).stat().st_dev:
+                remove_stale(path)
                 self._folders[path] = outer / f".{len(self._folders)}"
                 self._folders[path].mkdir()
             else:
@@ -183,70 +205,128 @@ class OutputFiles:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        try:
-            with self._cleanup:
+        files, older = {}, {}
+        with contextlib.ExitStack() as end, self._cleanup:
+            try:
                 if kind is None:
-                    self._publish()
-                    self._new_folders.clear()
-        finally:
-            for folder in reversed(self._new_folders):
-                with contextlib.suppress(OSError):  # another run may have written into it
-                    folder.rmdir()
+                    files = self._synced()
+                    older = self._kept_aside(files)
+            finally:
+                end.enter_context(_first_signal_waits(is_last=self._is_last))
+            if kind is None:
+                _publish(self._folders, files, older)
 
-    def _publish(self) -> None:
-        """Sync the staged files to disk, and give them their names instead of older files."""
+    def _synced(self) -> dict[Path, Path]:
+        """Sync the staged files to disk, and return them by their final names."""
         staged_files = {
             folder / file.name: file
             for folder, temporary in self._folders.items()
             for file in sorted(temporary.iterdir())
             if not file.is_dir()
         }
-        older = self._left_over(staged_files) if self._overwrite else []
         for path, file in staged_files.items():
+            with output_errors(path), file.open("rb+") as written:
+                os.fsync(written.fileno())
+        return staged_files
+
+    def _kept_aside(self, files: Mapping[Path, Path]) -> dict[Path, Path]:
+        """Give files that will be replaced or removed a second name, and return it by the first.
+
+        The new `files` get their permissions.
+        """
+        asides: dict[Path, Path] = {}
+        if not self._overwrite:
+            return asides
+        replaced = [path for path in files if os.path.lexists(path)]
+        for path in (*replaced, *self._left_over(files)):
             with output_errors(path):
-                with file.open("rb+") as written:
-                    os.fsync(written.fileno())
-                if self._overwrite and os.path.lexists(path):
-                    self._check_replaceable(path)
-                    older.append(path)
-                    if not path.is_symlink():
-                        file.chmod(stat.S_IMODE(path.stat().st_mode))
-        asides = {path: self._folders[path.parent] / _ASIDE / path.name for path in older}
-        _swap(staged_files, asides)
+                self._check_replaceable(path)
+                if path in files and not path.is_symlink():
+                    files[path].chmod(stat.S_IMODE(path.stat().st_mode))
+                asides[path] = self._folders[path.parent] / _ASIDE / path.name
+                asides[path].parent.mkdir(exist_ok=True)
+                _copy_name(path, asides[path])
+        return asides
 
     def _left_over(self, files: Container[Path]) -> list[Path]:
         """Return the files of earlier runs that this run did not write again."""
         return [
             file
             for folder, is_earlier in self._is_earlier.items()
+            if folder.exists()
             for file in folder.iterdir()
             if file not in files and file.is_file() and not file.is_symlink()
             if _id(file) not in self._inputs and is_earlier(file)
         ]
 
 
-def _swap(files: Mapping[Path, Path], older: Mapping[Path, Path]) -> None:
-    """Move older files aside, and give new ones their names; undo all if a step fails.
+@contextlib.contextmanager
+def _first_signal_waits(*, is_last: bool) -> Iterator[None]:
+    """Delay the first signal to the end of the block, or ignore it also after that if `is_last`.
 
-    `files` are new files, and `older` the places for older ones, by their final names. An interrupt
-    may come at any time, so the undo looks at what has been done.
+    A second one acts at once. Only Python's handlers are delayed; they run in the main thread.
     """
+    handlers = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
+    if threading.current_thread() is not threading.main_thread():
+        handlers = {}
+    waiting: list[int] = []
+
+    def restore() -> None:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+    def wait(number: int, _: object) -> None:
+        restore()
+        waiting.append(number)
+
+    with contextlib.ExitStack() as stack:
+        stack.callback(restore)
+        for number, handler in handlers.items():
+            if callable(handler):
+                signal.signal(number, wait)
+        yield
+        if is_last:
+            stack.pop_all()
+            return
+    for came in waiting:
+        signal.raise_signal(came)
+
+
+def _publish(
+    folders: Iterable[Path], files: Mapping[Path, Path], older: Mapping[Path, Path]
+) -> None:
+    """Create folders, give new files their names, remove older ones; undo all if a step fails.
+
+    `files` are new files, and `older` second names of older ones, by their final names. An
+    interrupt may come at any time, so the undo looks at what has been done.
+    """
+    new_folders: list[Path] = []  # outermost first
     try:
-        for path, aside in older.items():
-            with output_errors(path):
-                aside.parent.mkdir(exist_ok=True)
-                path.replace(aside)
+        for folder in folders:
+            with output_errors(folder):
+                missing = [item for item in (folder, *folder.parents) if not item.exists()]
+                new_folders += reversed(missing)
+                folder.mkdir(parents=True, exist_ok=True)
         for path, file in files.items():
             with output_errors(path):
-                _add_name(path, file)
+                if path in older:
+                    file.replace(path)
+                else:
+                    _add_name(path, file)
+        for path in older.keys() - files.keys():
+            with output_errors(path):
+                path.unlink()
     except BaseException:
         for path, file in files.items():
             is_renamed = not file.exists()
-            if is_renamed or (path.exists() and path.samefile(file)):
+            if path not in older and (is_renamed or (path.exists() and path.samefile(file))):
                 path.unlink(missing_ok=True)
         for path, aside in older.items():
-            if os.path.lexists(aside):
+            if not files.get(path, path).exists():
                 aside.replace(path)
+        for folder in reversed(new_folders):
+            with contextlib.suppress(OSError):  # another run may have written into it
+                folder.rmdir()
         raise
 
 
@@ -263,13 +343,27 @@ def _add_name(path: Path, file: Path) -> None:
         file.replace(path)  # a file system without hard links
 
 
-def _make_temporary(parent: Path, cleanup: contextlib.ExitStack) -> Path:
-    """Create an empty, locked folder in `parent`; `cleanup` unlocks and removes it."""
+def _copy_name(path: Path, aside: Path) -> None:
+    """Give a file a second name; where there are no hard links, copy it."""
+    try:
+        os.link(path, aside, follow_symlinks=False)
+    except OSError:
+        shutil.copy2(path, aside, follow_symlinks=False)
+
+
+def _existing(path: Path) -> Path:
+    """Return the nearest folder of a path that exists; itself if it does."""
+    return next(item for item in (path, *path.parents) if item.exists())
+
+
+def _make_temporary(path: Path, cleanup: contextlib.ExitStack) -> Path:
+    """Create an empty, locked folder near `path`; `cleanup` unlocks and removes it."""
     while True:
+        parent = _existing(path)  # a failed run may remove it
+        remove_stale(parent)
         folder = parent / f".vdet-{_HOST}-{os.urandom(8).hex()}"
         # An interrupt may come as soon as the folder exists.
         cleanup.callback(shutil.rmtree, folder, ignore_errors=True)
-        parent.mkdir(parents=True, exist_ok=True)  # a failed run may have removed it
         with contextlib.suppress(FileNotFoundError, BlockingIOError):  # removed as stale
             folder.mkdir(0o700)  # private content stays private while it is written
             cleanup.enter_context(_locked_folder(folder))

@@ -7,10 +7,9 @@ import sys
 from typing import NoReturn
 
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
+from vdet.files import ENDING_SIGNALS
 from vdet.workers import SINGLE_THREADED
 
-ENDING_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
-"""The signals that end the program: of Ctrl-C, of `kill`, and of a terminal that closes."""
 CLEANUP_TIMEOUT = 10  # seconds between a signal and a forced exit
 _NEW_OBJECTS = 20_000  # between two collections: what loading the libraries makes is no garbage
 _STDOUT, _STDERR = 1, 2

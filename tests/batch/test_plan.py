@@ -197,7 +197,7 @@ class TestRefused:
     def test_an_output_that_is_an_input(self) -> None:
         Path("out").mkdir()
         Path("out/a.mp4").symlink_to(Path("clips/a.mp4").absolute())
-        with pytest.raises(OutputError, match=r"out/a\.mp4: is the input itself"):
+        with pytest.raises(OutputError, match=r"out/a\.mp4: is an input of this run"):
             plan("clips", overwrite=True)
 
     def test_a_manifest_that_is_no_ordinary_file(self) -> None:

@@ -258,7 +258,7 @@ def test_fractions_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None
         (["t.csv", "-c", "l.yaml", "--size", "320x200"], 1, "for frames of 320×240"),
         (["t.csv", "-c", "l.yaml", "--size", "big"], 2, "'big' is not two numbers"),
         (["t.csv", "-c", "l.yaml", "--counts", "c.txt"], 1, "must end in .csv, .json"),
-        (["t.csv", "-c", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
+        (["t.csv", "-c", "l.yaml", "--counts", "t.csv"], 1, "is an input of this run"),
         (["t.txt", "-c", "l.yaml"], 1, "has no times; pass the frame rate"),
         (["none.csv", "-c", "l.yaml"], 1, "none.csv"),
         (["t.csv", "-c", "short.yaml"], 1, "short.yaml:1:1: traffic: gate: is shorter than 1 %"),

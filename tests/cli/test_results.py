@@ -22,8 +22,10 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
         with pytest.raises(OutputError, match="already exists; use --overwrite"):
             kept.check(NO_FILES)
     ResultFiles(str(target), page=folder, overwrite=True).check(NO_FILES)
-    with pytest.raises(OutputError, match="is the input itself"):
+    with pytest.raises(OutputError, match="is an input of this run"):
         ResultFiles(str(target), overwrite=True).check(file_ids([target]))
+    with pytest.raises(OutputError, match=r"page\.html: is used for two outputs"):
+        ResultFiles(str(folder / "page.html"), page=folder, overwrite=True).check(NO_FILES)
     with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
         ResultFiles(None, page=folder / "page.html", overwrite=True).check(NO_FILES)
 

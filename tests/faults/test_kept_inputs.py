@@ -59,5 +59,5 @@ def test_inputs_are_kept_also_with_overwrite(run: Run, folder: Path, arguments: 
     before = contents(folder)
     result = run(*arguments.split(), "--overwrite")
     assert contents(folder) == before, "files were changed, or others were left"
-    refused = result.err.endswith("is the input itself; use another output\n")
+    refused = result.err.endswith("is an input of this run; use another output\n")
     assert (result.code, refused) == (1, True), result.err

@@ -1,5 +1,6 @@
 """After Ctrl-C, SIGTERM or SIGHUP the program removes what is half-written and exits with 130."""
 
+import json
 import signal
 from pathlib import Path
 
@@ -19,6 +20,19 @@ class Slow:
             time.sleep(60)
 
 sys.meta_path.insert(0, Slow)
+"""
+
+IS_SIGNALLED = """
+import os, signal
+
+link = os.link
+
+def signalling(source, target, **options):
+    link(source, target, **options)
+    if target.suffix == ".mp4":
+        os.kill({process}, signal.{name})
+
+os.link = signalling
 """
 
 
@@ -41,14 +55,44 @@ def test_in_the_middle_of_a_video(
 def test_in_the_middle_of_a_batch(
     launch: Start, gate: Gate, clips: Path, tmp_path: Path, number: signal.Signals, to_all: bool
 ) -> None:
-    arguments = ("detect-video", clips, "-d", tmp_path, "--jobs", "2")
+    folders = ("--page", ".page", "--clips", ".clips", "--crops", ".crops")
+    arguments = ("detect-video", clips, "-d", tmp_path, "--jobs", "2", *folders)
     running = launch(*arguments, modules=gate.folder)
     until(lambda: len(gate.held()) == 2)
     running.send(number, to_all=to_all)
     result = running.finish()
     assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
     until(running.is_alone)
-    assert names(tmp_path) == ["manifest.jsonl"]
+    assert [path.name for path in tmp_path.rglob("*")] == ["manifest.jsonl"]
+
+
+def test_as_outputs_get_their_names(launch: Start, clips: Path, tmp_path: Path) -> None:
+    """The work is done: nothing is lost, and nothing temporary is left."""
+    code = IS_SIGNALLED.format(process="os.getpid()", name="SIGTERM")
+    (tmp_path / "sitecustomize.py").write_text(code)
+    out = tmp_path / "out"
+    out.mkdir()
+    arguments = ("detect-video", clips / "short.mp4", out / "o.mp4", "--tracks", out / "o.csv")
+    result = launch(*arguments, modules=tmp_path).finish()
+    assert (result.code, result.err.count(": written\n")) == (0, 2), result.err
+    assert sorted(path.name for path in out.iterdir()) == ["o.csv", "o.mp4"]
+
+
+def test_as_outputs_of_a_batch_get_their_names(
+    launch: Start, gate: Gate, clips: Path, tmp_path: Path
+) -> None:
+    """A file that is done stays done; the others are done by the next batch."""
+    with (gate.folder / "sitecustomize.py").open("a") as modules:
+        modules.write(IS_SIGNALLED.format(process="os.getppid()", name="SIGINT"))
+    sources = clips / "a.mp4", clips / "short.mp4"
+    arguments = ("detect-video", *sources, "-d", tmp_path, "--skip-existing")
+    running = launch(*arguments, "--jobs", "2", modules=gate.folder)
+    result = running.finish()
+    assert (result.code, result.err.splitlines()[-1]) == (130, "vdet: interrupted"), result.err
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["manifest.jsonl", "short.mp4"]
+    (line,) = (tmp_path / "manifest.jsonl").read_text().splitlines()
+    assert Path(json.loads(line)["input"]).name == "short.mp4"
+    assert ": 1 file done, 1 skipped, 0 failed" in launch(*arguments).finish().err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

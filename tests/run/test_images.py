@@ -158,6 +158,7 @@ class TestSeveral:
             assert not (tmp_path / "out").exists()
             assert not (tmp_path / "stages").exists()
         else:
+            (tmp_path / "out").mkdir()
             (tmp_path / "out" / "c.png").write_text("of another program")
             with pytest.raises(OutputError, match=r"c\.png: appeared during the run"):
                 list(results)

@@ -191,9 +191,10 @@ def run_batch(
                 yield run, record
             _write_totals(plan, errors)
     finally:
-        paths = [output.path for run in runs for output in run.outputs]
-        for folder in {path.parent for path in paths} | set(filter(os.path.isdir, paths)):
-            remove_stale(folder)
+        paths = (output.path for run in runs for output in run.outputs)
+        for folder in {item for path in paths for item in (path, *path.parents)}:
+            if folder.is_relative_to(plan.folder):
+                remove_stale(folder)
 
 
 def _write_totals(plan: Plan, errors: Mapping[Path, str | None]) -> None:

@@ -86,7 +86,7 @@ def count(
     from vdet.traffic.survey import Survey
 
     inputs = source.inputs(*tracks, *corrections, settings=settings)
-    files = OutputFiles(overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs, is_last=True)
     check_sinks(outputs, files)
     reviews, scene = read_corrections(corrections), survey_image(settings)
     with progress_steps(" files") as steps:

@@ -72,7 +72,7 @@ def detect_image(
     paths_below = find_images(images)
     outputs = options.requested_outputs(sinks, paths)
     inputs = source.inputs(*paths_below, settings=settings)
-    files = OutputFiles(overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs, is_last=True)
     check_sinks(outputs, files)
     jobs = plan_images(paths_below, output, stages, files)
     is_printed = not (output or stages or outputs)

@@ -206,7 +206,7 @@ def _drawn_video(paths: Sequence[Path], *, is_only: bool) -> Path:
 
     if len(videos) > 1 or (videos[0].is_file() and not may_replace_video(videos[0])):
         if file_ids([source]) & file_ids(videos):
-            raise OutputError(f"{videos[0]}: is the input itself; use another output")
+            raise OutputError(f"{videos[0]}: is an input of this run; use another output")
         shown = shlex.join(map(str, paths[:2])) + (" …" if len(paths) > 2 else "")
         raise click.UsageError(
             f"{videos[0]} would be replaced, but vdet did not write it; use another name, or for "
@@ -232,7 +232,7 @@ def _process_video(run: "Run") -> bool:
 
     with progress_steps(" frames") as steps:
         steps("opening", None)
-        totals = run_video(run, steps=steps)
+        totals = run_video(run, steps=steps, is_last=True)
     numbers = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
     rate = totals.frames / totals.seconds
     announce(f"{run.source}: {numbers}, {totals.seconds:.1f} s, {rate:.1f} frames/s")

@@ -54,7 +54,7 @@ def draw(
 
     settings = source.load()
     inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)
-    files = OutputFiles(overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs, is_last=True)
     files.check(output, suffixes=(".html", ".jpg", ".png", ".svg"))
     with progress_steps(" frames") as steps:
         # Without regions, because the page shows their effect.

@@ -21,7 +21,7 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
     Raises `VdetError` if the video or the tracks cannot be used, or an output cannot be written.
     """
     settings = run.settings
-    files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs)
+    files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs, is_last=True)
     check_sinks(run.outputs, files)
     with (
         VideoReader(run.source, start=run.start, end=run.end, settings=settings.input) as reader,

@@ -234,7 +234,9 @@ class Results(Iterator[FrameResult]):
         return findings_in(self._video.facts).items if self._video else ()
 
 
-def run_video(run: Run, parts: Parts | None = None, *, steps: Steps = no_steps) -> RunTotals:
+def run_video(
+    run: Run, parts: Parts | None = None, *, steps: Steps = no_steps, is_last: bool = False
+) -> RunTotals:
     """Process a run. Its outputs appear together, at the end of the run.
 
     Reading, searching and encoding run in threads, tracking and drawing in the calling thread.
@@ -245,6 +247,8 @@ def run_video(run: Run, parts: Parts | None = None, *, steps: Steps = no_steps) 
         The detector, the tracker and further steps; None: as the settings say.
     steps
         Called once, with the expected number of frames, for the progress.
+    is_last
+        As for `vdet.files.OutputFiles`.
 
     Raises
     ------
@@ -256,7 +260,7 @@ def run_video(run: Run, parts: Parts | None = None, *, steps: Steps = no_steps) 
 
     No output is left after an error.
     """
-    files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs)
+    files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs, is_last=is_last)
     check_sinks(run.outputs, files)
     with files:
         return write_outputs(run, files, parts, steps=steps)

@@ -1,6 +1,7 @@
 """The sink `clips`: which parts of a video it cuts out, and how."""
 
 import os
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -17,9 +18,11 @@ from run.red_runs import read, result_of, write
 from running import names
 from vdet.config.schema import ClipSettings
 from vdet.errors import OutputError
+from vdet.files import OutputFiles
 from vdet.media.reader import VideoReader
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import check_sinks
 from vdet.track.track import Track
 
 RATE = Fraction(25)
@@ -198,6 +201,27 @@ def test_overwriting_removes_earlier_clips_of_vdet_and_nothing_else(
     assert len(names(tmp_path)) == len(before) + 2
     cut(source, tmp_path, shown=[])
     assert names(tmp_path) == before
+
+
+@pytest.mark.parametrize("is_link", [False, True])
+def test_a_file_of_another_program_with_the_name_of_a_clip_is_kept(
+    source: Path, tmp_path: Path, is_link: bool
+) -> None:
+    cut(source, tmp_path)
+    theirs = tmp_path / names(tmp_path)[0]
+    if is_link:
+        theirs.rename(tmp_path / "ours.mp4")
+        theirs.symlink_to("ours.mp4")
+    else:
+        write_clip(theirs, count=2)
+    before, content = names(tmp_path), theirs.read_bytes()
+    words = f"{theirs.name}: was not written by vdet and will not be replaced"
+    with pytest.raises(OutputError, match=re.escape(words)):
+        check_sinks([Output("clips", tmp_path)], OutputFiles(overwrite=True))
+    with pytest.raises(OutputError, match=re.escape(words)):  # it came during the run
+        cut(source, tmp_path)
+    assert (names(tmp_path), theirs.is_symlink()) == (before, is_link)
+    assert theirs.read_bytes() == content
 
 
 def test_no_clip_is_cut_out_of_another_file_of_the_same_name(

@@ -117,7 +117,7 @@ class CropSink(BaseSink):
 
 
 def _is_crop(path: Path) -> bool:
-    return _CROP_NAME.fullmatch(path.name) is not None
+    return _CROP_NAME.fullmatch(path.name) is not None and not path.is_symlink()
 
 
 def _crop_name(vehicle: VehicleRecord, time: float) -> str:
@@ -127,7 +127,11 @@ def _crop_name(vehicle: VehicleRecord, time: float) -> str:
 
 
 CROPS = SinkKind(
-    CropSink, what="images of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
+    CropSink,
+    what="images of vehicles",
+    folder_pattern="vehicle-*-at-*s.*",
+    takes="videos",
+    may_replace=lambda path: not path.is_symlink(),
 )
 
 
@@ -327,7 +331,8 @@ class ClipSink(BaseSink):
 
 
 def _is_clip(path: Path) -> bool:
-    return _CLIP_NAME.fullmatch(path.name) is not None and is_marked(path)
+    is_named = _CLIP_NAME.fullmatch(path.name) is not None
+    return is_named and not path.is_symlink() and is_marked(path)
 
 
 def _state(path: Path) -> tuple[int, int, int, int] | None:
@@ -339,4 +344,10 @@ def _state(path: Path) -> tuple[int, int, int, int] | None:
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
-CLIPS = SinkKind(ClipSink, what="clips", folder_pattern="clip-*.*", takes="videos")
+CLIPS = SinkKind(
+    ClipSink,
+    what="clips",
+    folder_pattern="clip-*.*",
+    takes="videos",
+    may_replace=lambda path: _is_clip(path) or not _CLIP_NAME.fullmatch(path.name),
+)

@@ -220,24 +220,24 @@ def check_sinks(
     ConfigError
         A sink is unknown.
     """
-    seen: set[Path] = set()
     for output in outputs:
         kind, path = sink_kind(output.sink), output.path
         if not kind.takes_name(path.name):
             raise OutputError(f"{path}: {kind.what} must end in {', '.join(kind.endings)}")
         kind.check(path)
-        if path.resolve() in seen:
-            raise OutputError(f"{path}: is used for two outputs; rename one")
-        seen.add(path.resolve())
         if path == STANDARD_OUTPUT and kind.writes_standard_output:
+            files.claim(path)
             continue
+        written = [path]
         if kind.folder_pattern:
-            written = path.glob(kind.folder_pattern) if os.path.isdir(path) else ()  # noqa: PTH112
-            path = min(written, default=path / kind.folder_pattern)
+            files.claim(path)
+            written = sorted(path.glob(kind.folder_pattern)) if os.path.isdir(path) else []  # noqa: PTH112
+            path = next(iter(written), path / kind.folder_pattern)
         files.check(path, makes_folder=makes_folder or bool(kind.folder_pattern))
-        if os.path.lexists(path) and not kind.may_replace(path):
-            advice = "was not written by vdet and will not be replaced; choose another name"
-            raise OutputError(f"{path}: {advice}")
+        for path in filter(os.path.lexists, written):
+            if not kind.may_replace(path):
+                advice = "was not written by vdet and will not be replaced; choose another name"
+                raise OutputError(f"{path}: {advice}")
 
 
 def output_state(output: Output, staged: Path | None = None) -> tuple[int, int] | None:
