@@ -1,13 +1,15 @@
 """Findings: reasons to doubt a result, when they apply, and how much."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import pydantic
 from pydantic import AliasChoices, Field
 
-Severity = Literal["warning", "note"]
+Severity = Literal["warning", "note", "fact"]
+AT_LINES = "frame-rate", "ground", "line", "traces"
+"""Codes of findings about counts and speeds, which other lines may not have."""
 
 
 @pydantic.dataclasses.dataclass(frozen=True, slots=True)
@@ -23,7 +25,8 @@ class Finding:
     spans
         When it applies, in order; empty for the whole video.
     severity
-        "warning": the result may be wrong. "note": for information.
+        "warning": the result may be wrong. "note": for information. "fact": kept in tracks, because
+        it is a warning where there are lines, zones, regions or ground points: see `at_places`.
     value
         A measure, if there is one: fraction of the frame's width, of the motion, or of the vehicles
         that the network finds.
@@ -53,6 +56,18 @@ def warnings_in(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(finding for finding in findings if finding.severity == "warning")
 
 
+def without(findings: Iterable[Finding], codes: Collection[str]) -> tuple[Finding, ...]:
+    """Return the findings that do not have one of these codes."""
+    return tuple(finding for finding in findings if finding.code not in codes)
+
+
+def at_places(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings where lines, zones, regions or ground points are used."""
+    return tuple(
+        replace(item, severity="warning") if item.severity == "fact" else item for item in findings
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Findings:
     """The reasons to doubt the results of a video.
@@ -63,10 +78,13 @@ class Findings:
         All findings.
     is_still
         Whether the camera stood still.
+    facts
+        What is a finding only at other settings.
     """
 
     items: tuple[Finding, ...] = ()
     is_still: bool = False
+    facts: tuple[Finding, ...] = ()
 
     def record(self) -> list[dict[str, Any]]:
         """Return them as values for JSON."""

@@ -217,12 +217,13 @@ def test_a_line_in_the_wrong_place_is_reported(
     lines.write_text(LINES.replace("[100, 0], end: [100, 240]", "[0, 50], end: [320, 50]"))
     out = tmp_path / "c.json"
     result = run("count", write_tracks(tmp_path / "t.csv"), "-c", lines, "--counts", out)
-    assert "t.csv: gate: no path crosses this line; move it" in result.err
-    (warning,) = json.loads(out.read_text())["warnings"]
-    assert warning == "gate: no path crosses this line; move it"
+    note = "gate: no vehicle crossed this line [line]"
+    assert result.err == f"vdet: note: {tmp_path / 't.csv'}: {note}\n"
+    counts = json.loads(out.read_text())
+    assert (counts["warnings"], counts["notes"]) == ([], [note])
     wanted = ("--no-video", "--flows", tmp_path / "f.csv", "-c", lines)
     result = run("detect-video", folder / "red.mp4", *red, *wanted)
-    assert result.err.count("gate: no path crosses this line") == 1
+    assert result.err.count(note) == 1
 
 
 def test_several_files_are_counted_each_and_together(

@@ -144,7 +144,10 @@ def test_a_vehicle_that_comes_back_after_long_keeps_its_speed() -> None:
     ("scale", "warnings"),
     [
         (1.0, ()),
-        (4.0, ("camera.ground: cars are 18.0 m long by these points; check their metres",)),
+        (
+            4.0,
+            ("camera.ground: cars are 18.0 m long by these points; check their metres [ground]",),
+        ),
     ],
 )
 def test_cars_that_are_too_long_show_that_points_are_wrong(

@@ -4,6 +4,7 @@ import pytest
 
 from traffic.scenes import LINE, Path, counts, frames, through
 from vdet.config.shapes import LineSettings
+from vdet.findings import Finding
 
 DOWN = through((1, 600, 300), (5, 600, 500))
 
@@ -16,10 +17,9 @@ def test_a_line_across_the_way_is_fine() -> None:
     assert warnings(DOWN) == ()
 
 
-def test_a_line_that_no_path_crosses() -> None:
-    assert warnings(through((1, 600, 300), (5, 600, 340))) == (
-        "line: no path crosses this line; move it",
-    )
+def test_a_line_that_no_vehicle_crosses_is_noted() -> None:
+    found = counts(frames(through((1, 600, 300), (5, 600, 340))), LINE).findings
+    assert found == (Finding("line", "line: no vehicle crossed this line", severity="note"),)
 
 
 @pytest.mark.parametrize(
@@ -58,13 +58,13 @@ def test_a_few_among_many_are_no_fault_of_the_line() -> None:
 def test_a_line_that_is_shorter_than_a_vehicle() -> None:
     short = LineSettings(name="line", start=(580, 400), end=(620, 400))
     assert warnings(DOWN, line=short) == (
-        "line: this line is shorter than a vehicle; make it longer",
+        "line: this line is shorter than a vehicle; make it longer [line]",
     )
 
 
 @pytest.mark.parametrize(("rate", "is_low"), [(1, True), (2, True), (4, True), (5, False)])
 @pytest.mark.parametrize("paths", [(), (DOWN,)])
 def test_a_low_frame_rate(paths: tuple[Path, ...], rate: float, is_low: bool) -> None:
-    expected = "fewer than 5 frames per second: vehicles are missed; record more"
+    expected = "fewer than 5 frames per second: vehicles are missed; record more [frame-rate]"
     found = counts(frames(*paths, rate=rate, seconds=60), LINE).warnings
     assert (expected in found) == is_low

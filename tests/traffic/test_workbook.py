@@ -15,7 +15,7 @@ from vdet.findings import Finding
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Corrected, Counts, Event
 from vdet.traffic.estimate import Estimate
-from vdet.traffic.measures import movement
+from vdet.traffic.measures import HEAVY_NAMED, movement
 from vdet.traffic.survey import Survey
 from vdet.traffic.workbook import Sheet, SheetTable, write_workbook
 from vdet.version import __version__
@@ -69,7 +69,7 @@ def morning() -> dict[str, Counts]:
         event(1000, "north", "in", 2, "truck"),
         event(1010, "east", "out", 2, "truck"),
         event(3599, "south", "in", 3, "car"),
-        warnings=("east: this line is shorter than a vehicle; make it longer",),
+        findings=(Finding("line", "east: this line is shorter than a vehicle; make it longer"),),
         corrected=Corrected(2, ("fixes.yaml",), checked=20, minutes=60, estimates=(bus,)),
     )
     rest = counts(
@@ -115,6 +115,9 @@ def table(text: str) -> list[str]:
 
 def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> None:
     empty = " -" * 12
+    line = "east: this line is shorter than a vehicle; make it longer [line]"
+    doubts = f"{line}; the image is dark [dark]".replace(" ", "_")
+    heavy = HEAVY_NAMED.replace(" ", "_")
     facts = f"""
         {FORMULA} - {empty}
         surveyor A._Smith {empty}
@@ -127,7 +130,8 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
         clock from_its_name {empty}
         interval 30min {empty}
         checked 1_of_2_files {empty}
-        conditions 2_doubts,_see_Notes {empty}
+        conditions {doubts} {empty}
+        heavy_share {heavy} {empty}
         program vdet_{__version__} {empty}
         - - {empty}
         Checks - {empty}
@@ -237,7 +241,7 @@ def test_zones_vehicles_files_and_notes(book: Path) -> None:
         08.jsonl 08:00:00 08:10:00 600     continues from_its_name 2 1""")
     assert sheets["Notes"][:3] == table("""
         file note
-        07.jsonl east:_this_line_is_shorter_than_a_vehicle;_make_it_longer
+        07.jsonl east:_this_line_is_shorter_than_a_vehicle;_make_it_longer_[line]
         08.jsonl the_image_is_dark_[dark]""")
     assert sheets["Notes"][-1] == "- PCU:_truck_2.5;_all_other_classes_1."
 

@@ -7,11 +7,10 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import LOG, announce, print_lines, progress_steps
+from vdet.cli.messages import LOG, announce, announce_notes, print_lines, progress_steps
 from vdet.config.classes import OUR_NAMES, our_names
 from vdet.errors import DOUBTFUL, counted
 from vdet.files import OutputFiles, output_errors, write_text
-from vdet.findings import warnings_in
 
 if TYPE_CHECKING:
     from vdet.boxes import Image
@@ -97,6 +96,7 @@ def count(
             announce(f"{name}: begins {result.clock}")
         for warning in result.warnings:
             LOG.warning("%s: %s", name, warning)
+        announce_notes(name, result.findings)
     counted_classes = {event.class_name for result in videos.values() for event in result.events}
     for name in {*our_names(classes)} - {*counted_classes, *OUR_NAMES}:
         LOG.warning("--class %s: no vehicle of this class was counted", name)
@@ -108,7 +108,7 @@ def count(
     for name, result in videos.items():
         if result.corrected:
             print_lines(f"{name}: {result.corrected}")
-    is_doubtful = any(warnings_in(result.findings) for result in videos.values())
+    is_doubtful = any(result.warnings for result in videos.values())
     return DOUBTFUL if strict and is_doubtful else 0
 
 

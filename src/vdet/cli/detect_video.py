@@ -12,7 +12,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import LOG, announce, progress_steps
+from vdet.cli.messages import LOG, announce, announce_notes, progress_steps
 from vdet.errors import DOUBTFUL, OutputError, counted, failure_code
 from vdet.files import file_ids
 from vdet.run.sinks import Output
@@ -242,7 +242,9 @@ def _process_video(run: "Run") -> bool:
         announce(f"{run.source}: begins {totals.clock}")
     if totals.corrected:
         announce(f"{run.source}: {totals.corrected}")
-    return bool(warnings_in(findings_in(totals.facts).items))
+    findings = findings_in(totals.facts).items
+    announce_notes(run.source, findings)
+    return bool(warnings_in(findings))
 
 
 def _process_videos(

@@ -60,8 +60,9 @@ def draw(
         # Without regions, because the page shows their effect.
         whole_frames = settings.model_copy(update={"regions": ()})
         run = Run(clip, settings=whole_frames, start=start, end=end)
-        image, frames = read_scene(run, tracks, steps)
-    drawing = Drawing(image, frames, settings, given_values(source.configs))
+        image, scene = read_scene(run, tracks, steps)
+    values = given_values(source.configs)
+    drawing = Drawing(image, scene.frames, settings, values, scene.findings)
     name = Path([output.name, *source.configs][-1]).with_suffix(".yaml").name
     with files, output_errors(output):
         files.stage(output).write_bytes(drawing.output(output, name))

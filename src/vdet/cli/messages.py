@@ -3,7 +3,7 @@
 import logging
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,8 @@ from vdet.progress import Advance, Steps, no_steps
 
 if TYPE_CHECKING:
     from tqdm import tqdm
+
+    from vdet.findings import Finding
 
 LOG = logging.getLogger("vdet")
 
@@ -47,6 +49,12 @@ def announce(*lines: str) -> None:
     """Print lines on standard error, unless `--quiet` is set."""
     if lines and not is_quiet():
         print_lines(*lines, err=True)
+
+
+def announce_notes(name: "Path | str", findings: "Iterable[Finding]") -> None:
+    """Print the notes about lines among the findings about a file."""
+    notes = (item for item in findings if (item.severity, item.code) == ("note", "line"))
+    announce(*(f"vdet: note: {name}: {note}" for note in notes))
 
 
 class _LogHandler(logging.Handler):

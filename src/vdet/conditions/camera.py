@@ -102,12 +102,12 @@ class CameraWatch:
                 f"the camera moved at {clock_text(int(start))}, {extent}: lines, zones and regions "
                 "match only one part; process the two parts separately"
             )
-            return [Finding("camera-moved", text, ((start, end),), value=size)]
+            return [Finding("camera-moved", text, ((start, end),), "fact", size)]
         text = (
             f"the camera moves {when(spans)}, {extent}: lines, zones and regions no longer match; "
             "do not trust counts and speeds"
         )
-        return [Finding("camera-moves", text, tuple(spans), value=size)]
+        return [Finding("camera-moves", text, tuple(spans), "fact", size)]
 
     def _moved(self, plane: Image, lost: float) -> Float64Array:
         """Return the displacement of the corners of the frame in a plane, `(4, 2)` pixels.

@@ -12,7 +12,7 @@ from vdet.conditions.motion import MotionWatch
 from vdet.conditions.weak import WeakWatch
 from vdet.config.schema import Settings
 from vdet.detect.onnx.water import is_wet
-from vdet.findings import Finding, Findings
+from vdet.findings import Finding, Findings, at_places, without
 from vdet.media import Picture
 from vdet.track.track import Track
 
@@ -74,16 +74,18 @@ class Conditions:
             findings.append(Finding("small-frames", text, severity="note"))
         if self._times:
             times, measures = np.array(self._times), np.array(self._measures)
-            if settings.traffic or settings.regions or settings.camera.ground:
-                findings += self._camera.findings()
+            camera = self._camera.findings()
+            has_places = settings.traffic or settings.regions or settings.camera.ground
+            findings += at_places(camera) if has_places else camera
             watch = self._motion if self._camera.is_still else self._weak
             findings += watch.findings()
             is_shipped = detector.kind == "net" and detector.model is None
             wet = np.array(self._wet)
             findings += visibility.findings(times, measures, wet, is_shipped=is_shipped)
-        ignored = settings.conditions.ignore
-        chosen = tuple(item for item in findings if item.code not in ignored)
-        return Findings(chosen, self._camera.is_still)
+        chosen = without(findings, settings.conditions.ignore)
+        facts = tuple(item for item in chosen if item.severity == "fact")
+        items = tuple(item for item in chosen if item.severity != "fact")
+        return Findings(items, self._camera.is_still, facts)
 
 
 def planes_of(picture: Picture) -> tuple[Image, Image]:

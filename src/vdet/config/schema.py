@@ -61,7 +61,7 @@ class LaneSettings(Shape):
 
 Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
-    "lane-geometry", "small-frames", "traces", "uncertain",
+    "frame-rate", "ground", "lane-geometry", "line", "small-frames", "traces", "uncertain",
 ]  # fmt: skip
 """What makes a result doubtful; docs/conditions.md explains each."""
 
@@ -85,7 +85,7 @@ class ConditionSettings(Section):
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
     """Codes of findings to suppress: camera-moves, camera-moved, unexplained-motion, dark, haze,
-    blur, drops, lane-geometry, small-frames, traces, uncertain.
+    blur, drops, frame-rate, ground, lane-geometry, line, small-frames, traces, uncertain.
     """
 
 

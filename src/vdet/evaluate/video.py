@@ -1,5 +1,6 @@
 """Scores of labelled videos."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +11,7 @@ from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import Scores, score_comparison
+from vdet.findings import warnings_in
 from vdet.labels.label import Label, SavedTracks
 from vdet.labels.reading import read_tracks, read_truth
 from vdet.labels.roles import Roles
@@ -17,6 +19,8 @@ from vdet.progress import Steps, no_steps
 from vdet.regions import Regions
 from vdet.run.loop import Parts
 from vdet.run.video import Run, open_video
+
+_log = logging.getLogger("vdet")
 
 _DEFAULT = Settings()
 
@@ -63,6 +67,8 @@ def score_files(
         A file cannot be used.
     """
     tracks = read_tracks(prediction)
+    for finding in warnings_in(tracks.findings):
+        _log.warning("%s: %s", prediction, finding)
     truth = read_truth(truth_path, Roles.from_settings(settings))
     last = until or truth.last_frame
     return ClipResult(str(prediction), compare(tracks.until(last), truth.until(last)), last)

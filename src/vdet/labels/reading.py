@@ -10,7 +10,6 @@ from pathlib import Path
 
 from vdet.errors import TruthError
 from vdet.files import is_hidden
-from vdet.findings import warnings_in
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images
@@ -26,8 +25,7 @@ _log = logging.getLogger("vdet")
 def read_tracks(path: Path, rate: float | None = None, size: Size | None = None) -> SavedTracks:
     """Read the tracks of a video from a file in any format; ignore regions are omitted.
 
-    There is a warning (logger "vdet") for each reason to doubt them that the file has. Tracks
-    without a score have score 1. An empty `.txt` has no tracks.
+    Tracks without a score have score 1. An empty `.txt` has no tracks.
 
     Parameters
     ----------
@@ -57,8 +55,6 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
         (width, height), (expected_width, expected_height) = saved.size, size
         fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
         raise TruthError(f"{path}: {fault}")
-    for finding in warnings_in(saved.findings):
-        _log.warning("%s: %s", path, finding)
     return saved if rate is None else saved.at_rate(rate)
 
 

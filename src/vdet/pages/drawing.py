@@ -14,6 +14,7 @@ from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, is_chosen
 from vdet.config.loading import in_pixels
 from vdet.config.schema import Settings
+from vdet.findings import Finding
 from vdet.media.images import encode_image
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.pages.traffic import Mark, traffic_marks, with_marks
@@ -37,6 +38,8 @@ class Drawing:
         The tracks of its vehicles.
     values
         Values of the settings files so far, as of `given_values`.
+    findings
+        Reasons to doubt the tracks.
 
     Attributes
     ----------
@@ -50,10 +53,11 @@ class Drawing:
         frames: Sequence[FrameTracks],
         settings: Settings,
         values: Mapping[str, Any],
+        findings: Sequence[Finding] = (),
     ) -> None:
         height, width = image.shape[:2]
         self._image, self._frames, self._size = image, frames, (width, height)
-        self._settings, self._values = settings, values
+        self._settings, self._values, self._findings = settings, values, findings
         minimum, linked = settings.traffic.min_seen_seconds, link_tracks(frames, width, height)
         self.paths: list[VehiclePath] = [
             path
@@ -91,7 +95,7 @@ class Drawing:
         }
         scripts = ((TEMPLATES / script).read_text("utf-8") for script in ("yaml.js", "draw.js"))
         script = Markup("\n".join(scripts))
-        return render("draw.html", data=data, name=name, script=script)
+        return render("draw.html", data=data, name=name, script=script, findings=self._findings)
 
     def _marks(self) -> list[Mark]:
         counts = count_frames(self._frames, self._settings, self._size)

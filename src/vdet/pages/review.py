@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from vdet.config.classes import OUR_NAMES
 from vdet.config.shapes import TrafficSettings
+from vdet.findings import Finding
 from vdet.media import VideoInfo
 from vdet.pages.render import TEMPLATES, render
 from vdet.traffic.counts import Event, class_of
@@ -85,6 +86,7 @@ class Review:
     pictures: Sequence[StripPicture]
     marks: Sequence[Mark]
     traces: Sequence[Trace]
+    findings: Sequence[Finding] = ()
     written: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
 
     @property
@@ -156,7 +158,8 @@ class Review:
 def write_review(file: TextIO, review: Review, folder: Path) -> None:
     """Write the page. `folder` has its pictures, WebP files; a vehicle may have none."""
     scripts = [Markup((TEMPLATES / name).read_text("utf-8")) for name in _SCRIPTS]
-    page = render("review.html", data=review.data(), scripts=scripts, name=review.video.name)
+    name, findings = review.video.name, review.findings
+    page = render("review.html", data=review.data(), scripts=scripts, name=name, findings=findings)
     before, _, after = page.partition(_PICTURES)
     file.write(before)
     crops = {crop_name(mark.event.id) for mark in review.marks}

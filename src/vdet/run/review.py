@@ -5,9 +5,10 @@ from pathlib import Path
 from vdet.boxes import NO_BOXES
 from vdet.errors import VideoError
 from vdet.files import OutputFiles
+from vdet.findings import Findings
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
-from vdet.run.result import FrameResult, findings_in
+from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.scene import saved_frames
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
 from vdet.run.video import Run, log
@@ -28,10 +29,8 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
         files,
     ):
         info = reader.info
-        frames = {
-            frame.index: frame
-            for frame in saved_frames(tracks, run, (info.width, info.height), info)
-        }
+        scene = saved_frames(tracks, run, (info.width, info.height), info)
+        frames = {frame.index: frame for frame in scene.frames}
         traffic = LiveTraffic(settings, info.width, info.height)
         context = SinkContext(files, settings, info, is_part=run.is_part, traffic=traffic)
         advance = steps("", reader.expected)
@@ -46,6 +45,8 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
                 count += 1
             if not count:
                 raise VideoError(f"{run.source}: no frames at these times; check them")
-            traffic.end(findings_in(context.facts))
+            traffic.end(Findings(scene.findings))
+            if counts := traffic.counts():
+                context.facts[FINDINGS] = Findings(counts.findings)
         for warning in str(findings_in(context.facts)).splitlines():
             log.warning("%s: %s", run.source, warning)

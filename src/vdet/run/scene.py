@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from vdet.boxes import Image
 from vdet.errors import TruthError, VideoError
+from vdet.findings import Finding, at_places, warnings_in, without
 from vdet.labels.label import Size
 from vdet.labels.reading import read_tracks
 from vdet.media import Frame, VideoInfo
@@ -16,6 +17,7 @@ from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
 from vdet.regions import Regions
+from vdet.run.result import findings_in
 from vdet.run.steps import tracks_inside
 from vdet.run.video import Run, log, open_video
 from vdet.track.track import FrameTracks
@@ -26,10 +28,19 @@ _STILL_FRAMES = 5000
 """Number of frames to read for it if the tracks are saved."""
 
 
-def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list[FrameTracks]]:
+@dataclass(frozen=True, slots=True)
+class SceneTracks:
+    """The tracks of the vehicles in a scene, and reasons to doubt them where there are lines."""
+
+    frames: list[FrameTracks]
+    findings: tuple[Finding, ...] = ()
+
+
+def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, SceneTracks]:
     """Return the scene without vehicles, BGR uint8 `(H, W, 3)`, and the tracks of its vehicles.
 
-    The image is the median of frames of the video, or the source if that is an image.
+    The image is the median of frames of the video, or the source if that is an image. There is a
+    warning (logger "vdet") for each reason to doubt the tracks.
 
     Parameters
     ----------
@@ -44,18 +55,20 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list
     if is_image_file(run.source):
         image = read_image(run.source)
         height, width = image.shape[:2]
-        return image, saved_frames(tracks, run, (width, height)) if tracks else []
-    images, shown = (
-        _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)
-    )
-    if not images:
-        raise VideoError(f"{run.source}: no frames in this part; check --start and --end")
-    return np.median(images, axis=0).astype(np.uint8), shown
+        shown = saved_frames(tracks, run, (width, height)) if tracks else SceneTracks([])
+    else:
+        images, shown = (
+            _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)
+        )
+        if not images:
+            raise VideoError(f"{run.source}: no frames in this part; check --start and --end")
+        image = np.median(images, axis=0).astype(np.uint8)
+    for finding in warnings_in(shown.findings):
+        log.warning("%s: %s", run.source, finding)
+    return image, shown
 
 
-def _with_saved_tracks(
-    run: Run, tracks: Path, steps: Steps
-) -> tuple[list[Image], list[FrameTracks]]:
+def _with_saved_tracks(run: Run, tracks: Path, steps: Steps) -> tuple[list[Image], SceneTracks]:
     """Return some of the first images, and all saved tracks."""
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
@@ -66,7 +79,7 @@ def _with_saved_tracks(
         return _spread(reader), saved
 
 
-def _with_detection(run: Run, steps: Steps) -> tuple[list[Image], list[FrameTracks]]:
+def _with_detection(run: Run, steps: Steps) -> tuple[list[Image], SceneTracks]:
     """Return some of the images, and the tracks of all frames."""
     shown: list[FrameTracks] = []
     with open_video(run, with_traffic=False) as video:
@@ -78,7 +91,8 @@ def _with_detection(run: Run, steps: Steps) -> tuple[list[Image], list[FrameTrac
                 yield result.frame
                 advance(1)
 
-        return _spread(frames()), shown
+        images, findings = _spread(frames()), findings_in(video.facts)
+        return images, SceneTracks(shown, at_places((*findings.items, *findings.facts)))
 
 
 def _spread(frames: Iterable[Frame]) -> list[Image]:
@@ -92,9 +106,7 @@ def _spread(frames: Iterable[Frame]) -> list[Image]:
     return images
 
 
-def saved_frames(
-    tracks: Path, run: Run, size: Size, video: VideoInfo | None = None
-) -> list[FrameTracks]:
+def saved_frames(tracks: Path, run: Run, size: Size, video: VideoInfo | None = None) -> SceneTracks:
     """Return the frames of a file of tracks in the part of a run, with the vehicles in its regions.
 
     `size` is that of the frames, pixels. Without a video, the first frame of the file is the first
@@ -109,8 +121,9 @@ def saved_frames(
     start = origin + float(run.start or 0)
     end = math.inf if run.end is None else origin + float(run.end)
     regions = Regions(run.settings.regions, *size)
-    return [
+    frames = [
         replace(frame, tracks=tracks_inside(regions, frame.tracks))
         for frame in saved
         if start <= frame.time < end
     ]
+    return SceneTracks(frames, without(at_places(saved.findings), run.settings.conditions.ignore))

@@ -4,7 +4,7 @@ import logging
 import time
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from vdet.media.reader import VideoReader
 from vdet.progress import Steps, no_steps
 from vdet.run.inputs import input_files
 from vdet.run.loop import Parts, build, named_errors, peek
-from vdet.run.result import Fact, Facts, FrameResult, findings_in
+from vdet.run.result import FINDINGS, Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.threads import read_async
@@ -181,6 +181,8 @@ def open_video(
             facts.update(pipeline.facts())
             if with_traffic:
                 traffic.end(findings_in(facts))
+                if counts := traffic.counts():
+                    facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
 
         with closing(results()) as every_result:
             yield OpenVideo(reader, pipeline.detector, every_result, traffic, facts)
@@ -302,8 +304,7 @@ def write_outputs(
             if not frames:
                 raise _no_frame(run, video.reader)
         counts = video.traffic.counts()
-        fact_lines = [line for fact in video.facts.values() for line in str(fact).splitlines()]
-        for warning in (*(counts.warnings if counts else ()), *fact_lines):
+        for warning in (line for fact in video.facts.values() for line in str(fact).splitlines()):
             log.warning("%s: %s", run.source, warning)
     return RunTotals(
         width=info.width,

@@ -8,6 +8,7 @@ from statistics import median
 
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
+from vdet.findings import Finding
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
 from vdet.traffic.counts import Counts, Direction, Event
@@ -107,15 +108,16 @@ class VehicleCounter:
         events = [event for passage in passages for event in passage.events]
         events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
         directions = tuple((item.name, way) for item in self.borders for way in item.directions)
-        warnings = list(_line_warnings(self.lines, passages))
+        findings = list(_line_findings(self.lines, passages))
         if 2 * self._long_steps > self._steps:
-            warnings.insert(0, "fewer than 5 frames per second: vehicles are missed; record more")
+            text = "fewer than 5 frames per second: vehicles are missed; record more"
+            findings.insert(0, Finding("frame-rate", text))
         return Counts(
             events=tuple(events),
             directions=directions,
             zones=tuple(zone.name for zone in self.zones),
             spans=tuple(self.spans) or ((0.0, 0.0),),
-            warnings=tuple(warnings),
+            findings=tuple(findings),
             outside_flows=self._settings.traffic.outside_flows,
             classes=self._settings.classes or self._settings.detector.vehicle_classes,
         )
@@ -171,24 +173,25 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
     )
 
 
-def _line_warnings(lines: Sequence[Line], passages: Sequence[_Passage]) -> Iterator[str]:
-    """Yield a sentence for each problem of a line that the tracks of a run show."""
+def _line_findings(lines: Sequence[Line], passages: Sequence[_Passage]) -> Iterator[Finding]:
+    """Yield each problem of a line that the tracks of a run show."""
     for line in lines if passages else ():
         crossed = [heights for passage in passages if (heights := passage.heights[line.name])]
         tolerated = _FEW_WRONG * len(crossed)
         missed = sum(line.name in passage.missed for passage in passages)
         repeated = sum(len(heights) > 1 for heights in crossed)
-        if not crossed:
-            yield f"{line.name}: no path crosses this line; move it"
+        problems = []
         if missed > tolerated:
-            yield (
-                f"{line.name}: tracks that begin or end at this line and are not counted: "
-                f"{missed}; move it to where vehicles are tracked longer"
+            problems.append(
+                f"tracks that begin or end at this line and are not counted: {missed}; move it to "
+                "where vehicles are tracked longer"
             )
         if repeated > tolerated:
-            yield (
-                f"{line.name}: paths that cross this line more than once: {repeated}; place it "
-                "across the road"
+            problems.append(
+                f"paths that cross this line more than once: {repeated}; place it across the road"
             )
         if crossed and line.length < median(height for heights in crossed for height in heights):
-            yield f"{line.name}: this line is shorter than a vehicle; make it longer"
+            problems.append("this line is shorter than a vehicle; make it longer")
+        if not crossed:
+            yield Finding("line", f"{line.name}: no vehicle crossed this line", severity="note")
+        yield from (Finding("line", f"{line.name}: {problem}") for problem in problems)

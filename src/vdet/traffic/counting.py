@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
-from vdet.findings import Finding
+from vdet.findings import Finding, at_places, without
 from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_head, read_tracks
 from vdet.lanes.ground import ground_of
@@ -188,7 +188,11 @@ class _Video:
         )
         spans = self.spans or ((self.first, self.first),)
         of_video = replace(
-            group, events=tuple(events), spans=spans, clock=self.clock, findings=self.findings
+            group,
+            events=tuple(events),
+            spans=spans,
+            clock=self.clock,
+            findings=(*self.findings, *group.findings),
         )
         return with_speeds(of_video, self.meter)
 
@@ -241,7 +245,7 @@ class _Recording:
         """Count in the next video, whose frames have this size."""
         before = self._latest
         video = _Video(str(path), size, clock, saved.first_time, saved.covered is not None)
-        video.findings = saved.findings
+        video.findings = at_places(saved.findings)
         if self._is_chain and before:
             video.clock = _clock_after(before[0], video)
         gap = 0.0
@@ -282,7 +286,7 @@ class _Group:
     """Videos that follow one another, with frames of one size and one counter."""
 
     def __init__(self, settings: Settings, size: tuple[int, int], started: int = 0) -> None:
-        self.size = size
+        self.size, self._ignored = size, settings.conditions.ignore
         self._ground = ground_of(settings.camera, *size)
         self.counter = VehicleCounter(settings, *size, started)
         self._videos: list[_Video] = []
@@ -323,9 +327,11 @@ class _Group:
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with times in that video."""
         group = self.counter.counts()
-        counts = {video.name: video.counts(group) for video in self._videos}
-        for video in self._videos[1:]:  # the warnings are those of the group
-            counts[video.name] = replace(counts[video.name], warnings=())
+        counts = {}
+        for video in self._videos:
+            own = video.counts(group)
+            counts[video.name] = replace(own, findings=without(own.findings, self._ignored))
+            group = replace(group, findings=())  # the first video has those of the group
         return counts
 
 

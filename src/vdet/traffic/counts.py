@@ -222,10 +222,9 @@ class Counts:
         The parts with video, seconds.
     clock
         None if unknown.
-    warnings
-        A sentence for each misplaced line, a low frame rate, and impossible lengths of cars.
     findings
-        Reasons to doubt the tracks.
+        Reasons to doubt the tracks and the counts: also misplaced lines, a low frame rate, and
+        impossible lengths of cars.
     corrected
         What a reviewer corrected; None if nothing was.
     outside_flows
@@ -241,7 +240,6 @@ class Counts:
     zones: tuple[str, ...]
     spans: tuple[Span, ...] = ((0.0, 0.0),)
     clock: Clock | None = None
-    warnings: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     corrected: Corrected | None = None
     traces: "tuple[Trace, ...]" = ()
@@ -249,9 +247,9 @@ class Counts:
     classes: tuple[str, ...] = ()
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """A sentence for each reason to doubt the counts."""
-        return (*map(str, warnings_in(self.findings)), *self.warnings)
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each finding by which the counts may be wrong."""
+        return tuple(map(str, warnings_in(self.findings)))
 
     @property
     def flow_names(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
-from vdet.findings import Findings
+from vdet.findings import Findings, without
 from vdet.lanes.ground import ground_of
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
@@ -52,7 +52,7 @@ class LiveTraffic:
         self.clock = clock
         self._corrections = corrections
         self._records = VehicleRecords(width)
-        self._classes = settings.classes
+        self._classes, self._ignored = settings.classes, settings.conditions.ignore
         self._final: Counts | None = None
         self.vehicles: tuple[VehicleRecord, ...] = ()
         if corrections:  # they may be of any class; the selection follows
@@ -76,9 +76,13 @@ class LiveTraffic:
         return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
 
     def add_traces(self, traces: "Sequence[Trace]") -> None:
-        """Add what passed without a track to the counts, after `end`."""
+        """Add what passed without a track to the counts, with its findings, after `end`."""
+        from vdet.traffic.traces import trace_findings  # most runs have no strips
+
         if self._final:
-            self._final = replace(self._final, traces=tuple(traces))
+            counts = replace(self._final, traces=tuple(traces))
+            found = without(trace_findings(counts), self._ignored)
+            self._final = replace(counts, findings=counts.findings + found)
 
     def end(self, findings: Findings) -> None:
         """Make records and counts, after the last frame.
@@ -87,7 +91,9 @@ class LiveTraffic:
         """
         records = self._records.end(self.speeds, is_still=findings.is_still)
         if counts := self.counts():
-            self._final = counts = replace(counts, findings=findings.items)
+            self._final = counts = replace(
+                counts, findings=without((*findings.items, *counts.findings), self._ignored)
+            )
             if self._corrections:
                 self._final = self._corrections.apply(counts, self._classes)
                 _correct(records, counts, self._final)

@@ -131,7 +131,8 @@ def _json(
     by_video: dict[str, Any] = {}
     for name, video in videos.items():
         begin = plain_time(video.clock and video.clock.at(video.spans[0][0]))
-        by_video[name] = {"begin": begin, "warnings": list(video.warnings)}
+        notes = [str(item) for item in video.findings if item.severity == "note"]
+        by_video[name] = {"begin": begin, "warnings": list(video.warnings), "notes": notes}
         if video.corrected:
             by_video[name]["corrected"] = asdict(video.corrected)
         if video.traces:

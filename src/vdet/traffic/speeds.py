@@ -23,6 +23,7 @@ from statistics import median
 import numpy as np
 
 from vdet.boxes import EDGE, Float64Array
+from vdet.findings import Finding
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
@@ -188,16 +189,17 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
             )
             latest[event.id] = event.time
     cars = {event.id for event in counts.events if event.class_name == "car"} & by_track.keys()
-    warnings = *counts.warnings, *_length_warnings([by_track[number].length for number in cars])
-    return replace(counts, events=tuple(events), warnings=warnings)
+    lengths = _length_findings([by_track[number].length for number in cars])
+    return replace(counts, events=tuple(events), findings=(*counts.findings, *lengths))
 
 
-def _length_warnings(lengths: Sequence[float]) -> Iterator[str]:
-    """Yield a sentence if cars cannot have these lengths, metres: the points are wrong."""
+def _length_findings(lengths: Sequence[float]) -> Iterator[Finding]:
+    """Yield a finding if cars cannot have these lengths, metres: the points are wrong."""
     moved = [length for length in lengths if not math.isnan(length)]
     low, high = _CAR_LENGTHS
     if len(moved) >= _MIN_CARS and not low <= (length := median(moved)) <= high:
-        yield f"camera.ground: cars are {length:.1f} m long by these points; check their metres"
+        text = f"camera.ground: cars are {length:.1f} m long by these points; check their metres"
+        yield Finding("ground", text)
 
 
 def _kmh(speed: float | None) -> float | None:

@@ -28,6 +28,8 @@ _PEAK = "peak hour", "vehicles in it", "peak hour factor"
 _ESTIMATE = "class", "counted", "estimated", "at least", "at most"
 _SPEEDS = "median km/h", "85 % km/h"
 _ALL = "all"
+_MOST = 3
+"""Maximum number of doubts in the summary."""
 _NOTES = f"""\
 part: there is no video in more than a second of the interval. Per hour: of the time observed.
 peak hour: the four successive quarters of an hour, all observed, with the most vehicles. Its \
@@ -108,7 +110,9 @@ class Survey:
         survey, whole = self.settings.survey, self._whole
         files = counted(len(self.videos), "file")
         checked = sum(counts.corrected is not None for counts in self.counts)
-        doubts = sum(len(counts.doubts) for counts in self.counts)
+        doubts = list(dict.fromkeys(text for counts in self.counts for text in counts.warnings))
+        if more := len(doubts[_MOST:]):
+            doubts[_MOST:] = [f"and {counted(more, 'other')}, see Notes"]
         clocks = dict.fromkeys(counts.clock.source for counts in self.counts if counts.clock)
         times = (time for time in (whole.start, whole.end) if isinstance(time, datetime))
         zones = dict.fromkeys(f"UTC{time.isoformat()[-6:]}" for time in times)
@@ -123,7 +127,8 @@ class Survey:
             "clock": ", ".join(clocks) or "unknown: times are those of the video",
             "interval": self.settings.traffic.interval or "the whole time",
             "checked": f"{checked} of {files}" if checked else "no, counted automatically",
-            "conditions": f"{counted(doubts, 'doubt')}, see Notes" if doubts else "no doubts",
+            "conditions": "; ".join(doubts) or "no doubts",
+            "heavy share": measures.HEAVY_NAMED if len(self._classes) > 1 else None,
             "program": f"vdet {__version__}",
         }
         rows = [fact for fact in facts.items() if fact[1] is not None]
@@ -232,7 +237,7 @@ class Survey:
             period = Intervals([(counts.clock, counts.spans)], None).periods[0]
             clock = counts.clock.source if counts.clock else "unknown"
             times = [_time(period.start), _time(period.end), period.observed]
-            numbers = len(counts.events), len(counts.doubts)
+            numbers = len(counts.events), len(counts.warnings)
             rows.append([name, *times, _seam(before, period), clock, *numbers])
             before = period
         headings = "file", "first frame", "last frame", "observed, s", "after the file before"
@@ -250,9 +255,11 @@ class Survey:
         return SheetTable([*headings, *_ESTIMATE], rows, "Checks")
 
     def notes(self) -> SheetTable:
-        """Return the warnings and doubts of each file, and what the sheets mean."""
+        """Return the findings of each file, and what the sheets mean."""
         rows: list[list[Cell]] = [
-            [name, text] for name, counts in self.videos.items() for text in counts.doubts
+            [name, text]
+            for name, counts in self.videos.items()
+            for text in map(str, counts.findings)
         ]
         units = [f"{name} {number:g}" for name, number in self.settings.traffic.pcu.items()]
         rows += [["", text] for text in _NOTES.splitlines()]

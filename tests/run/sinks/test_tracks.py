@@ -122,13 +122,15 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("ending", [".jsonl", ".coco.json"])
 def test_tracks_know_their_video_its_clock_and_why_they_may_be_wrong(
-    tmp_path: Path, ending: str, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, ending: str
 ) -> None:
     findings = Findings(
         (
             Finding("camera-moves", "the camera moves", ((0.0, 2.0),), value=0.1),
             Finding("lane-geometry", "no values in metres", severity="note"),
-        )
+            Finding("line", "gate: no vehicle crossed this line"),
+        ),
+        facts=(Finding("camera-moved", "the camera moved", severity="fact"),),
     )
     path, clock = tmp_path / f"tracks{ending}", Clock(BEGIN, "its creation time")
     settings = SETTINGS.model_copy(update={"classes": ("car",)})
@@ -139,5 +141,4 @@ def test_tracks_know_their_video_its_clock_and_why_they_may_be_wrong(
     assert (saved.begin, saved.begin_source) == (BEGIN, "its creation time")
     assert saved.video.classes == ("car",)
     assert saved.video.settings["tracker"]["kind"] == SETTINGS.tracker.kind
-    assert [finding.code for finding in saved.video.findings] == ["camera-moves", "lane-geometry"]
-    assert caplog.messages == [f"{path}: the camera moves [camera-moves]"]
+    assert saved.findings == (*findings.items[:2], *findings.facts)

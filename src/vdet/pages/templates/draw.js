@@ -230,7 +230,7 @@ function warningsOf(line, visits, paths, span) {
   const missed = paths.filter(isMissed).length, again = visits.filter(([, some]) => some.length > 1).length;
   const heights = visits.flatMap(([path, some]) => some.map(each => path.heights[each.row]));
   return [
-    paths.length && !visits.length && "no path crosses this line; move it",
+    paths.length && !visits.length && "no vehicle crossed this line",
     missed > few && `tracks that begin or end at this line and are not counted: ${missed}; ` +
       "move it to where vehicles are tracked longer",
     again > few && `paths that cross this line more than once: ${again}; place it across the road`,

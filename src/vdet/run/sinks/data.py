@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, Self
 
 from vdet.errors import OutputError
 from vdet.files import json_text, print_now, valid_text, write_text
+from vdet.findings import AT_LINES, without
 from vdet.labels.coco import COCO, write_coco_images
 from vdet.labels.formats import (
     ImageTracks,
@@ -65,7 +66,8 @@ class TrackSink(BaseSink):
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with self._file or nullcontext():
             if kind is None:
-                self._writer.end(findings_in(self.context.facts).items)
+                findings = findings_in(self.context.facts)
+                self._writer.end((*without(findings.items, AT_LINES), *findings.facts))
         if self._file is None:
             sys.stdout.flush()
 

@@ -30,7 +30,7 @@ from vdet.traffic.strips import (
     layers_of,
     sampling_of,
 )
-from vdet.traffic.traces import Trace, TraceSearch, trace_findings
+from vdet.traffic.traces import Trace, TraceSearch
 
 _MINUTE = 60
 _ENOUGH = 6
@@ -187,6 +187,7 @@ class ReviewSink(BaseSink):
             pictures=self._pictures,
             marks=self._marks(counts.events),
             traces=counts.traces,
+            findings=counts.findings,
         )
         with self._file.open("w", encoding="utf-8", errors="backslashreplace") as file:
             write_review(file, review, Path(self._folder.name))
@@ -199,11 +200,10 @@ class ReviewSink(BaseSink):
 
     def _add_traces(self) -> None:
         """Add the traces to the counts, and the findings about them to the facts."""
-        facts, ignored = self.context.facts, self.context.settings.conditions.ignore
         self.traffic.add_traces(sorted(self._traces, key=lambda trace: trace.time))
-        counts, findings = self.traffic.counts(), findings_in(facts)
-        if counts and "traces" not in ignored:
-            facts[FINDINGS] = replace(findings, items=findings.items + trace_findings(counts))
+        if counts := self.traffic.counts():
+            facts = self.context.facts
+            facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
 
     def _marks(self, events: Sequence[Event]) -> list[Mark]:
         """Return where the counted events are."""

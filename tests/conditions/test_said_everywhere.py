@@ -1,0 +1,95 @@
+"""Every doubt about a video is said at every step: 35 cells of a table."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import openpyxl
+import pytest
+from benchmarks.conditions import CHANGES, SETTINGS
+from benchmarks.zero import RATE, SIZE, traffic
+
+from conftest import Run as Program
+from red_cars import NullDetector
+from run.red_runs import outputs
+from vdet import load_settings
+from vdet.boxes import Image
+from vdet.config.rendering import render_settings
+from vdet.config.schema import OutputSettings
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.writer import VideoWriter
+from vdet.run.loop import Parts
+from vdet.run.sinks import Output
+from vdet.run.video import Run, run_video
+from vdet.synthetic.render import Renderer
+
+FRAMES = 6 * RATE
+WITHOUT_LINES = load_settings("svm")
+"""The recall of this detector is not known, so poor visibility is a warning."""
+WITH_LINES = WITHOUT_LINES.model_copy(update={"traffic": SETTINGS.traffic})
+Change = Callable[[Image, int], Image]
+
+
+def pan(image: Image, index: int) -> Image:
+    wide = cv2.copyMakeBorder(image, 0, 0, 0, 20 * FRAMES, cv2.BORDER_REFLECT_101)
+    return np.asarray(wide[:, 20 * index : 20 * index + SIZE[0]], np.uint8)
+
+
+def changed(name: str) -> Change:
+    return lambda image, _: CHANGES[name](image, np.random.default_rng(1), 0.0)
+
+
+WAYS: dict[str, tuple[Change, str]] = {
+    "pan": (pan, "the camera moves"),
+    "dark": (changed("night"), "it is dark"),
+    "haze": (changed("fog"), "contrast is low"),
+    "water": (changed("drops"), "water or dirt on the lens"),
+}
+
+
+def text_of(path: Path) -> str:
+    """Return the text of an output: of a workbook, that of its summary."""
+    if path.suffix == ".xlsx":
+        rows = openpyxl.load_workbook(path)["Summary"].values
+        return " ".join(str(cell) for row in rows for cell in row)
+    if path.is_dir():
+        [path] = path.glob("*.html")
+    return path.read_text()
+
+
+@pytest.fixture(scope="module")
+def clean() -> list[Image]:
+    renderer = Renderer(traffic(1))
+    return [renderer.image(index) for index in range(FRAMES)]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_doubt_is_said_at_every_step(
+    tmp_path: Path, run: Program, way: str, clean: list[Image], caplog: pytest.LogCaptureFixture
+) -> None:
+    change, words = WAYS[way]
+    clip, tracks, gate = (tmp_path / name for name in ("in.mp4", "tracks.jsonl", "gate.yaml"))
+    info = VideoInfo(clip, *SIZE, Fraction(RATE), Fraction(1, RATE), frames=FRAMES)
+    with VideoWriter(clip, info, OutputSettings()) as writer:
+        for index, image in enumerate(clean):
+            shown = np.ascontiguousarray(change(image, index))
+            writer.write(Frame(index, Fraction(index, RATE), Picture(shown)))
+    gate.write_text(render_settings(SETTINGS))
+    files = {".json": "c.json", ".xlsx": "c.xlsx", "page": "page", "review": "review"}
+    sinks = zip(("counts", "counts", "page", "review"), files.values(), strict=True)
+    written = tuple(Output(sink, tmp_path / name) for sink, name in sinks)
+
+    run_video(Run(clip, outputs(tracks=tracks), WITHOUT_LINES), Parts(NullDetector()))
+    assert (words in caplog.text) is (way != "pan")  # every dashcam moves
+    caplog.clear()
+    run_video(Run(clip, written, WITH_LINES), Parts(NullDetector()))
+    places = {"terminal": caplog.text}
+    places |= {place: text_of(tmp_path / name) for place, name in files.items()}
+    counted = run("count", tracks, "-c", gate, "--strict", code=4)
+    drawn = run("draw", clip, "--tracks-from", tracks, "-o", tmp_path / "draw.html")
+    places |= {"count of saved tracks": counted.err, "draw": text_of(tmp_path / "draw.html")}
+    assert words in drawn.err
+    assert {place for place, text in places.items() if words not in text} == set()
+    assert len(places) == 7
