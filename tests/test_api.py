@@ -126,6 +126,34 @@ def test_a_detector_takes_an_array_or_the_path_of_a_picture(tmp_path: Path) -> N
         detector.detect(wrong)
 
 
+def test_only_the_classes_of_the_settings_are_detected_in_images(tmp_path: Path) -> None:
+    def find(_: Image) -> vdet.Boxes:
+        sides = [(0, 0, 9, 9), (20, 0, 29, 9)]
+        return vdet.Boxes(sides, [0.9, 0.8], classes=[0, 1], names=("car", "truck"))
+
+    write_image(tmp_path / "in.png", np.zeros((64, 64, 3), np.uint8))
+    settings = vdet.load_settings(assignments=["classes=[truck]"])
+    detector = vdet.Detector(settings, detector=find)
+    for found in (
+        detector.detect(tmp_path / "in.png"),
+        vdet.detect_image(tmp_path / "in.png", settings=settings, detector=find),
+    ):
+        assert [(item.class_name, item.box.x1) for item in found] == [("truck", 20)]
+
+
+@pytest.mark.parametrize(("assignments", "step"), [([], 1), (["detector.stride=3"], 3)])
+def test_a_detector_object_is_not_taken_for_that_of_the_settings(
+    red_clip: Path, tmp_path: Path, assignments: list[str], step: int
+) -> None:
+    settings = vdet.load_settings(assignments=["classes=[]", *assignments])
+    found = vdet.follow(red_clip, settings=settings, detector=red_boxes, frames=7)
+    assert [result.searched for result in found] == [n % step == 0 for n in range(7)]
+    run = vdet.Run(red_clip, settings=settings, frames=7)
+    vdet.detect_video(run, tracks=tmp_path / "t.jsonl", detector=red_boxes)
+    head = json.loads((tmp_path / "t.jsonl").read_text().splitlines()[0])
+    assert head["video"]["settings"]["detector"]["kind"] == "object"
+
+
 def test_a_notebook_shows_a_result_as_its_frame_with_the_vehicles() -> None:
     (frame,) = drive(1)
     box = vdet.Box(96, 120, 160, 168)

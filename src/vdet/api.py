@@ -229,8 +229,8 @@ def follow(
     source
         The video, or a `Run`, which has its own settings and part.
     detector, tracker
-        Objects or names, see the module docstring; None: as set. With a detector object and no
-        settings, every frame is searched. Several threads search frames at once.
+        Objects or names, see the module docstring; None: as set. A detector object searches every
+        frame, unless the settings say which. Several threads search frames at once.
     steps
         Each receives every result, and returns it, changed or unchanged.
     start, end
@@ -422,9 +422,10 @@ def _choose(
         section = load_layers(assignments=[f"tracker.kind={tracker}"]).tracker
         effective, tracker = effective.model_copy(update={"tracker": section}), None
     if detector is not None and not isinstance(detector, str | PathLike):
-        if settings is None:
-            every_frame = DetectorSettings(kind="object")
-            effective = effective.model_copy(update={"detector": every_frame})
+        rates = {"searches_per_second", "stride"} - effective.detector.model_fields_set
+        own = {"kind": "object", "model": None, **dict.fromkeys(rates)}
+        own_section = effective.detector.model_copy(update=own)
+        effective = effective.model_copy(update={"detector": own_section})
         return effective, Parts(as_model(detector), tracker)
     if detector is not None:
         effective = _with_detector(effective, os.fspath(detector))

@@ -10,6 +10,7 @@ temporary folder is the only copy of an older file.
 import contextlib
 import fcntl
 import json
+import math
 import os
 import platform
 import re
@@ -469,7 +470,29 @@ def print_now(text: str) -> None:
 
 def json_text(values: Any, *, ensure_ascii: bool = True) -> str:
     """Return values as JSON, indented; only ASCII can be printed everywhere."""
-    return json.dumps(values, indent=2, allow_nan=False, ensure_ascii=ensure_ascii) + "\n"
+    return json_line(values, indent=2, ensure_ascii=ensure_ascii)
+
+
+def json_line(values: Any, **options: Any) -> str:
+    """Return values as a line of JSON, with `options` of `json.dumps`; NaN and infinity are null.
+
+    JSON has no such numbers.
+    """
+    try:
+        return json.dumps(values, allow_nan=False, **options) + "\n"
+    except ValueError:
+        return json.dumps(_finite(values), **options) + "\n"
+
+
+def _finite(values: Any) -> Any:
+    match values:
+        case float():
+            return values if math.isfinite(values) else None
+        case Mapping():
+            return {key: _finite(value) for key, value in values.items()}
+        case list() | tuple():
+            return list(map(_finite, values))
+    return values
 
 
 def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> bytes:

@@ -1,6 +1,7 @@
 """The loop: what is found in a video, what is kept, and what is left when something breaks."""
 
 import gc
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -28,11 +29,34 @@ from vdet.media import Frame
 from vdet.media.frame import Planes
 from vdet.run import video
 from vdet.run.loop import FIRST_FRAMES, Parts
+from vdet.run.result import FrameResult
 from vdet.run.threads import SearchThreads
-from vdet.run.video import run_video
+from vdet.run.video import Run, run_video
 
 QUEUED = 24
 """Largest number of frames that a run may hold at a time."""
+
+
+class Says:
+    """A step that adds a fact."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        return replace(result, facts={self._name: self})
+
+    def record(self) -> dict[str, list[float]]:
+        return {"values": [math.nan, 1.0, -math.inf]}
+
+
+def test_facts_of_a_step_are_json_and_replace_nothing(red_clip: Path, tmp_path: Path) -> None:
+    run = Run(red_clip, outputs(tracks=tmp_path / "t.jsonl"), frames=5)
+    run_red(run, steps=[Says("mine")])
+    for line in (tmp_path / "t.jsonl").read_text().splitlines():
+        assert '"mine": {"values": [null, 1.0, null]}' in line
+    with pytest.raises(VdetError, match="tracks: a step must name its fact differently"):
+        run_red(replace(run, overwrite=True), steps=[Says("tracks")])
 
 
 class TestFollowFrames:

@@ -68,6 +68,14 @@ def test_the_counts_so_far_have_those_inside_a_zone() -> None:
     assert found["line", "here"] == 1
 
 
+def test_the_counts_so_far_may_be_of_fewer_classes() -> None:
+    counter = VehicleCounter(SETTINGS, WIDTH, HEIGHT, running=["truck"])
+    for frame in frames(DOWN, through((2, 300, 350), (4, 500, 350))):
+        counter.update(frame)
+        assert not counter.so_far()
+    assert counter.counts().events
+
+
 def test_a_vehicle_that_stands_for_long_takes_no_memory() -> None:
     def stands() -> Iterator[FrameTracks]:
         drives = [(600.0, 300.0 + 2 * n) for n in range(50)]

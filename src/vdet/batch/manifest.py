@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from vdet.errors import OutputError
-from vdet.files import lock, output_errors, remove_stale
+from vdet.files import json_line, lock, output_errors, remove_stale
 from vdet.run.result import FINDINGS
 from vdet.version import __version__
 
@@ -110,7 +110,7 @@ class Record:
     @property
     def line(self) -> str:
         """The line of the manifest."""
-        return json.dumps(asdict(self), allow_nan=False) + "\n"
+        return json_line(asdict(self))
 
 
 def note_path(folder: Path, path: Path) -> Path:

@@ -8,7 +8,6 @@ Source: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, tabl
 
 import csv
 import io
-import json
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,6 +21,7 @@ from pydantic.dataclasses import dataclass
 
 from vdet.config.camera import parse_date_time
 from vdet.errors import TruthError
+from vdet.files import json_line
 from vdet.findings import Finding
 from vdet.labels.formats import VIDEO, Format
 from vdet.labels.label import Label, SavedTracks, SourceVideo, from_size, line_error
@@ -138,7 +138,7 @@ def _json_lines(frame: FrameTracks) -> Iterator[str]:
     tracks = [track_record(track) for track in frame.tracks]
     record = {"frame": frame.index, "time": round(frame.time, 6), "tracks": tracks}
     video = {VIDEO: frame.facts[VIDEO]} if VIDEO in frame.facts else {}  # at the start of the file
-    yield json.dumps({**video, **record, **frame.facts}) + "\n"
+    yield json_line({**video, **record, **frame.facts})
 
 
 def _csv_lines(frame: FrameTracks) -> Iterator[str]:

@@ -2,11 +2,12 @@
 
 import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
 from vdet.boxes import Boxes, Image
+from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_images_of
 from vdet.errors import ImageError
@@ -126,7 +127,9 @@ class ImageSearch:
                 if isinstance(step, ParallelStep):
                     step.prepare(frame)
                 result = step.apply(result)
-        return result.of_classes(self.settings.classes)
+        classes, found = self.settings.classes, result.detections
+        rows = [row for row, name in enumerate(found.class_names) if is_chosen(name, classes)]
+        return replace(result.of_classes(classes), detections=found[rows])
 
     def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return an image of each stage of the detector by its name, in order."""

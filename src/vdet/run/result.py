@@ -10,6 +10,7 @@ import cv2
 
 from vdet.boxes import Boxes
 from vdet.config.classes import is_chosen
+from vdet.errors import ConfigError
 from vdet.findings import Findings
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
@@ -33,6 +34,10 @@ Facts = Mapping[str, Fact]
 
 FINDINGS = "conditions"
 """Name of the fact that has the reasons to doubt the results of a video."""
+
+
+_KEYS = {"frame", "time", "tracks", "clock", "video", "findings", "last", "image", "boxes"}
+"""Keys of a record, which no fact about a frame may have."""
 
 
 def findings_in(facts: Facts) -> Findings:
@@ -79,6 +84,12 @@ class FrameResult:
         """The tracks with the number, time and facts of the frame."""
         facts = {name: fact.record() for name, fact in self.facts.items()}
         return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)
+
+    def __post_init__(self) -> None:
+        if taken := _KEYS & self.facts.keys():
+            raise ConfigError(
+                f"{min(taken)}: a step must name its fact differently: outputs have it"
+            )
 
     def of_classes(self, classes: Collection[str]) -> "FrameResult":
         """Return the result with only the tracks of some classes; empty for all."""

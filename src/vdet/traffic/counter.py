@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
 
@@ -52,6 +52,8 @@ class VehicleCounter:
     ----------
     started
         Number of vehicles counted before.
+    running
+        The classes of the running counts, if those of `settings` are more; empty for the same.
 
     Attributes
     ----------
@@ -68,8 +70,16 @@ class VehicleCounter:
         `camera.size` has another aspect ratio than `width` × `height` pixels.
     """
 
-    def __init__(self, settings: Settings, width: int, height: int, started: int = 0) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        width: int,
+        height: int,
+        started: int = 0,
+        running: Collection[str] = (),
+    ) -> None:
         self._settings = settings
+        self._running = running
         self.lines, self.zones = lines_and_zones(settings.traffic, width, height)
         self.spans: list[Span] = []
         self.borders: tuple[Border, ...] = (*self.lines, *self.zones)
@@ -91,8 +101,12 @@ class VehicleCounter:
         if paths := self.linker.add(frame):
             ended = self._passages(paths)
             self._ended += ended
-            events = (event for passage in ended for event in passage.events)
-            self._ended_counts.update((event.name, event.direction) for event in events)
+            self._ended_counts.update(
+                (event.name, event.direction)
+                for passage in ended
+                for event in passage.events
+                if is_chosen(event.class_name, self._running)
+            )
 
     def start_video(self) -> int:
         """Treat the ids of the next frames as other tracks, because they are of another video.
@@ -134,6 +148,7 @@ class VehicleCounter:
                 (event.name, event.direction)
                 for passage in self._passages(self.linker.open_paths())
                 for event in passage.events
+                if is_chosen(event.class_name, self._running)
                 if event.direction != VANISH or now - event.time > MAX_GAP
             )
         return self._running_counts

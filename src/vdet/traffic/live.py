@@ -57,7 +57,9 @@ class LiveTraffic:
         self.vehicles: tuple[VehicleRecord, ...] = ()
         if corrections:  # they may be of any class; the selection follows
             settings = settings.model_copy(update={"classes": ()})
-        self.counter = VehicleCounter(settings, width, height) if settings.traffic else None
+        self.counter = None
+        if settings.traffic:
+            self.counter = VehicleCounter(settings, width, height, running=self._classes)
         ground = ground_of(settings.camera, width, height)
         self.speeds = SpeedMeter(ground, width, height) if ground else None
 
