@@ -22,7 +22,6 @@ R = TypeVar("R")
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
 """Variables that limit libraries to one thread, because frames and files run in parallel."""
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """CPU quota and period of this process's control group (cgroup v2)."""
@@ -44,28 +43,6 @@ def limit_library_threads() -> None:
 
     cv2.setNumThreads(1)
     threadpool_limits(1)
-
-
-IMAGES = 32_000_000, 64_000_000
-"""Limits for `return_freed_memory` with which each image reuses the memory of an earlier one.
-
-Allocating new memory takes longer than decoding an image into it.
-"""
-
-
-def return_freed_memory(minimum: int = 1_000_000, at_end: int = 16_000_000) -> None:
-    """Let glibc return freed memory to the system, with limits in bytes.
-
-    Blocks of at least `minimum`, such as frames, are returned, and the end of the heap once
-    `at_end` of it are free. By default glibc raises its limit to 32 MB, and keeps frames in gaps of
-    the heap. Does nothing with other C libraries.
-    """
-    import ctypes
-
-    with contextlib.suppress(AttributeError, OSError, TypeError):
-        set_limit = ctypes.CDLL(None).mallopt
-        set_limit(_M_MMAP_THRESHOLD, minimum)
-        set_limit(_M_TRIM_THRESHOLD, at_end)
 
 
 def call_all(

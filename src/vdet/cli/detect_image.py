@@ -12,7 +12,7 @@ from vdet.cli.messages import LOG, announce, print_lines, progress_steps
 from vdet.errors import ImageError, counted, failure_code
 from vdet.files import OutputFiles
 from vdet.run.sinks import Output
-from vdet.workers import IMAGES, core_count, return_freed_memory
+from vdet.workers import core_count
 
 if TYPE_CHECKING:
     from vdet.run.result import FrameResult
@@ -67,7 +67,6 @@ def detect_image(
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images
     from vdet.run.sinks.protocol import STANDARD_OUTPUT, check_sinks
 
-    return_freed_memory(*IMAGES)
     search = ImageSearch(load_detector(settings.detector), settings)
     paths_below = find_images(images)
     outputs = options.requested_outputs(sinks, paths)

@@ -9,7 +9,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.options import ResultFiles, SettingsSource, facts_options, results_options
-from vdet.workers import IMAGES, core_count, return_freed_memory
+from vdet.workers import core_count
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
@@ -48,7 +48,6 @@ def images(
     from vdet.labels.reading import read_labelled_images
     from vdet.labels.roles import Roles
 
-    return_freed_memory(*IMAGES)
     detector = load_detector(settings.detector.showing_all())
     roles = Roles.from_settings(settings)
     sets = [read_labelled_images(path, roles) for path in data]

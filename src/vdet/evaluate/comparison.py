@@ -17,7 +17,6 @@ import numpy as np
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.config.classes import UNKNOWN
 from vdet.labels.label import Label, SavedTracks, boxes_of
-from vdet.track.motion.pairing import assign
 
 MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""
@@ -226,6 +225,18 @@ def _counting(tracks: Sequence[Label], truth: Sequence[Label]) -> tuple[list[Lab
     counts &= ~at_least(coverage(boxes, regions), _IGNORED_FRACTION).any(axis=1)
     counts[paired] = True
     return vehicles, list(compress(tracks, counts))
+
+
+def assign(values: Float64Array) -> tuple[Int64Array, Int64Array]:
+    """Pair rows with columns, each at most once, to maximize the sum of the values, `(n, m)`.
+
+    Returns the rows, ascending, and the columns of the pairs with a value above 0.
+    """
+    from scipy.optimize import linear_sum_assignment  # a run does without it
+
+    rows, columns = linear_sum_assignment(values, maximize=True)
+    is_pair = values[rows, columns] > 0
+    return rows[is_pair], columns[is_pair]
 
 
 def _ids(labels: Iterable[Label]) -> Int64Array:

@@ -20,11 +20,11 @@ from vdet.evaluate.comparison import (
     UNMATCHED,
     ComparedFrame,
     Comparison,
+    assign,
     at_least,
     compare,
 )
 from vdet.labels.label import SavedTracks
-from vdet.track.motion.pairing import assign
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 

@@ -85,7 +85,11 @@ class SearchRate:
 
 
 MAX_KEY_INTERVAL = 0.25
-"""Maximum time between the searches of two key frames, seconds."""
+"""Maximum time between the searches of two key frames, seconds.
+
+In the project video, with none, 630 frames are searched instead of 570, and a run takes 13 % more
+processor time.
+"""
 
 _MAX_SEGMENT = 16
 """Maximum number of frames of a segment: they are in memory together."""

@@ -28,7 +28,7 @@ from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.counts import Corrected, Counts
 from vdet.traffic.live import LiveTraffic
 from vdet.traffic.records import VehicleRecord
-from vdet.workers import core_count, return_freed_memory
+from vdet.workers import core_count
 
 log = logging.getLogger("vdet")
 
@@ -276,7 +276,6 @@ def write_outputs(
     Other parameters and errors as for `run_video`.
     """
     start_time = time.perf_counter()
-    return_freed_memory()
     kinds = [sink_kind(output.sink) for output in run.outputs]
     with_traffic = bool(run.settings.traffic) or any(kind.uses_traffic for kind in kinds)
     with open_video(run, parts, with_traffic=with_traffic) as video:
