@@ -3,6 +3,7 @@
 import json
 import math
 import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from red_cars import HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
 from vdet.boxes import Image
 from vdet.detect.onnx.detector import SHIPPED
+from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
@@ -79,6 +81,13 @@ def test_the_public_names_are_listed_and_documented_and_no_others_are_there() ->
         assert getattr(vdet, name).__doc__, f"vdet.{name} has no docstring"
     with pytest.raises(AttributeError, match="no attribute 'Dedector'"):
         _ = vdet.Dedector
+
+
+def test_names_that_went_say_what_to_use() -> None:
+    for name, module in vdet._DEPRECATED.items():
+        assert name not in vdet.api.__all__
+        with pytest.warns(DeprecationWarning, match=rf"use {re.escape(module)}\.{name}$"):
+            assert isinstance(getattr(vdet, name), type)
 
 
 def test_importing_vdet_has_no_side_effect() -> None:
@@ -201,6 +210,9 @@ def test_a_run_has_its_own_part_and_settings(clip_path: Path) -> None:
         next(vdet.follow(run, frames=2))
     with pytest.raises(ValueError, match="settings: a Run has its own"):
         vdet.detect_video(run, settings=vdet.load_settings())
+    wrong: Any = {"fames": 2}
+    with pytest.raises(TypeError, match=r"^fames: unknown option; known: settings, detector, "):
+        vdet.follow(clip_path, **wrong)
 
 
 def test_a_run_is_a_value() -> None:
@@ -218,7 +230,7 @@ def test_messages_name_parameters(clip_path: Path, tmp_path: Path) -> None:
         vdet.load_settings(assignments=["output.crf=99"])
     line = "traffic.lines=[{name: a, start: [0, 0], end: [1, 1]}]"
     settings = vdet.load_settings(assignments=[line])
-    with pytest.raises(vdet.VdetError, match=r"pass size, such as size=\(1280, 720\)"):
+    with pytest.raises(vdet.VdetError, match=r"as in size=\(1280, 720\)"):
         vdet.count([vdet.FrameTracks(0, 0.0, ())], settings)
 
 
@@ -244,7 +256,7 @@ def test_the_tracker_that_looks_at_pixels_asks_for_them() -> None:
 class Red:
     """A detector of the user's own: red things."""
 
-    def search(self, picture: vdet.Picture, index: int | None) -> vdet.Boxes:  # noqa: ARG002
+    def search(self, picture: Picture, index: int | None) -> vdet.Boxes:  # noqa: ARG002
         return red_boxes(picture.image)
 
     def detect(self, candidates: vdet.Boxes) -> vdet.Boxes:
@@ -265,7 +277,7 @@ class Latest:
         self,
         detections: vdet.Boxes,
         time: float,  # noqa: ARG002
-        picture: vdet.Picture | None = None,  # noqa: ARG002
+        picture: Picture | None = None,  # noqa: ARG002
     ) -> list[vdet.Track]:
         return [
             vdet.Track(number, detection.box, 0.9, state="detected")
@@ -375,7 +387,7 @@ def test_follow_may_be_left_while_a_frame_is_read(
     reads, goes_on, closed = threading.Event(), threading.Event(), threading.Event()
     deliver, leave = VideoReader.__iter__, VideoReader.__exit__
 
-    def slow(self: VideoReader) -> Iterator[vdet.Frame]:
+    def slow(self: VideoReader) -> Iterator[Frame]:
         for number, frame in enumerate(deliver(self)):
             yield frame
             if number == 1:

@@ -275,7 +275,7 @@ def test_what_may_not_be_replaced_is_refused_before_any_work(tmp_path: Path) -> 
     path.touch()
     os.mkfifo(pipe)
     OutputFiles(overwrite=True).check(path)
-    with pytest.raises(OutputError, match="already exists; use --overwrite"):
+    with pytest.raises(OutputError, match="already exists; use overwrite=True"):
         OutputFiles().check(path)
     for overwrite in (True, False):
         with pytest.raises(OutputError, match="is not a regular file and will not be replaced"):

@@ -15,10 +15,31 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__getattr__("__all__")})  # type: ignore[misc]
 
 
-def __getattr__(name: str) -> object:
-    if name == "__all__" or not name.startswith("__"):
-        from importlib import import_module
+_DEPRECATED = {
+    "DetectorModel": "vdet.detect.protocol",
+    "Event": "vdet.traffic.counts",
+    "Frame": "vdet.media",
+    "Output": "vdet.run.sinks",
+    "Picture": "vdet.media",
+    "SinkContext": "vdet.run.sinks.protocol",
+    "Step": "vdet.run.steps",
+    "StepContext": "vdet.run.steps",
+    "VideoDetector": "vdet.detect.protocol",
+    "VideoTracker": "vdet.track.track",
+}
+"""Names that vdet 1.0 exported, with their modules."""
 
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
+    if module := _DEPRECATED.get(name):
+        from warnings import warn
+
+        text = f"vdet.{name} will be removed in vdet 2.0; use {module}.{name}"
+        warn(text, DeprecationWarning, stacklevel=2)
+        return getattr(import_module(module), name)
+    if name == "__all__" or not name.startswith("__"):
         api = import_module("vdet.api")
         if name == "__all__" or name in api.__all__:
             return getattr(api, name)

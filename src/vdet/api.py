@@ -17,13 +17,13 @@ A name is that of a kind of detector or tracker, from vdet or another package, o
 import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import chain
 from os import PathLike
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -33,15 +33,13 @@ from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.factory import DetectorObject, as_model, load_detector
-from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ArgumentError, ArgumentTypeError, ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.files import OutputFiles, valid_text
-from vdet.findings import Finding
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks
-from vdet.media import Frame, Picture
+from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.progress import no_steps, reporting
 from vdet.run.images import ImageJob, ImageSearch, run_images
@@ -49,24 +47,22 @@ from vdet.run.inputs import input_files
 from vdet.run.loop import Parts
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
-from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, check_sinks
-from vdet.run.steps import Step, StepContext
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkKind, check_sinks
+from vdet.run.steps import Step
 from vdet.run.video import Results, Run, RunTotals, open_video, run_video
 from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.corrections import read_corrections
 from vdet.traffic.counting import count_files, count_frames
-from vdet.traffic.counts import Counts, Event
+from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord
 
 __all__ = (
     "BaseSink", "BatchTotal", "Box", "Boxes", "Counts", "Detector", "DetectorKind",
-    "DetectorModel", "DetectorSettings", "Event", "Finding", "Format", "Frame", "FrameResult",
-    "FrameTracks", "Label", "Output", "Picture", "Results", "Run", "RunTotals", "SavedTracks",
-    "Scores", "Settings", "SinkContext", "SinkKind", "Step", "StepContext", "Track", "Tracker",
-    "TrackerKind", "TrackerSettings", "VdetError", "VehicleRecord", "VideoDetector",
-    "VideoTracker", "count", "detect_image", "detect_video", "evaluate_tracks", "follow",
-    "load_settings", "vehicles",
+    "DetectorSettings", "Format", "FrameResult", "FrameTracks", "Label", "Results", "Run",
+    "RunTotals", "SavedTracks", "Scores", "Settings", "SinkKind", "Track", "Tracker",
+    "TrackerKind", "TrackerSettings", "VdetError", "VehicleRecord", "count", "detect_image",
+    "detect_video", "evaluate_tracks", "follow", "load_settings", "vehicles",
 )  # fmt: skip
 
 PathName = str | PathLike[str]
@@ -76,31 +72,6 @@ AnyTracker = str | VideoTracker
 Seconds = float | Fraction
 
 
-_PARAMETERS = {
-    "--set": "assignments",
-    "use --overwrite": "use overwrite=True",
-    "--size, such as 1280x720": "size, such as size=(1280, 720)",
-    "--rate 25": "rate=25",
-    "--rate": "rate",
-    "--model": "detector=FILE",
-    "--begin": "the setting input.begin",
-    "an earlier --at": "an earlier Run.at",
-}
-"""Options of the command line in messages, and the parameters that take their place in Python."""
-
-
-@contextmanager
-def _named_for_python() -> Iterator[None]:
-    """Raise errors with the names of parameters in place of those of command line options."""
-    try:
-        yield
-    except VdetError as error:
-        for option, parameter in _PARAMETERS.items():
-            error.args = tuple(str(line).replace(option, parameter) for line in error.args)
-        raise
-
-
-@_named_for_python()
 def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settings:
     """Read settings.
 
@@ -211,23 +182,13 @@ class Tracker:
         return self._tracker.at(time)
 
 
-def follow(
-    source: PathName | Run,
-    *,
-    settings: Settings | None = None,
-    detector: AnyDetector | None = None,
-    tracker: AnyTracker | None = None,
-    steps: Sequence[Step] = (),
-    start: Seconds | None = None,
-    end: Seconds | None = None,
-    frames: int | None = None,
-) -> Results:
-    """Return an iterator over the frames of a video, each with its detections and tracks.
+class RunOptions(TypedDict, total=False):
+    """How a video is processed: keywords of `follow`, `vehicles` and `detect_video`.
 
-    Parameters
+    Attributes
     ----------
-    source
-        The video, or a `Run`, which has its own settings and part.
+    settings
+        None: the defaults. A `Run` in place of the video has its own, and its own part.
     detector, tracker
         Objects or names, see the module docstring; None: as set. A detector object searches every
         frame, unless the settings say which. Several threads search frames at once.
@@ -237,52 +198,47 @@ def follow(
         Seconds from the first frame; frames with start ≤ time < end are processed.
     frames
         Maximum number of frames to process.
+    """
+
+    settings: Settings | None
+    detector: AnyDetector | None
+    tracker: AnyTracker | None
+    steps: Sequence[Step]
+    start: Seconds | None
+    end: Seconds | None
+    frames: int | None
+
+
+def follow(source: PathName | Run, **options: Unpack[RunOptions]) -> Results:
+    """Return an iterator over the frames of a video, each with its detections and tracks.
+
+    `source` is the video, or a `Run`; the `options` are those of `RunOptions`: `settings`,
+    `detector`, `tracker`, `steps`, `start`, `end` and `frames`.
 
     Raises `VideoError` with the first frame if the video cannot be read or searched.
     """
-    run, parts = _prepare(
-        source, settings, detector, tracker, steps, start=start, end=end, frames=frames
-    )
-    return Results(open_video(run, parts))
+    return Results(open_video(*_prepare(source, options)))
 
 
-@_named_for_python()
-def vehicles(
-    source: PathName | Run,
-    *,
-    settings: Settings | None = None,
-    detector: AnyDetector | None = None,
-    tracker: AnyTracker | None = None,
-    steps: Sequence[Step] = (),
-    start: Seconds | None = None,
-    end: Seconds | None = None,
-    frames: int | None = None,
-) -> tuple[VehicleRecord, ...]:
+def vehicles(source: PathName | Run, **options: Unpack[RunOptions]) -> tuple[VehicleRecord, ...]:
     """Return a record of each vehicle of a video, by id: its times, class and path.
 
     Parameters and errors as for `follow`.
     """
-    run, parts = _prepare(
-        source, settings, detector, tracker, steps, start=start, end=end, frames=frames
-    )
-    results = Results(open_video(run, parts))
+    results = follow(source, **options)
     deque(results, maxlen=0)
     return results.vehicles
 
 
-@_named_for_python()
 def detect_video(
     source: PathName | Run,
     video: PathName | None = None,
     *,
     tracks: Paths = (),
     outputs: Mapping[str, Paths] | None = None,
-    settings: Settings | None = None,
-    detector: AnyDetector | None = None,
-    tracker: AnyTracker | None = None,
-    steps: Sequence[Step] = (),
     overwrite: bool = False,
     progress: Callable[[int, int | None], object] | None = None,
+    **options: Unpack[RunOptions],
 ) -> RunTotals:
     """Find and follow the vehicles in a video, and write the requested outputs.
 
@@ -291,7 +247,7 @@ def detect_video(
     Parameters
     ----------
     source
-        The video, or a `Run` to choose a part of it or a number of threads.
+        The video, or a `Run` to choose a number of threads, too.
     video
         Output: the video with a box around each vehicle, .mp4, .mov or .mkv.
     tracks
@@ -304,15 +260,14 @@ def detect_video(
     progress
         Called after each frame with the number of frames done, and the total, None if unknown.
 
-    Other parameters as for `follow`; errors as for the command `vdet detect-video`.
+    Options as for `follow`; errors as for the command `vdet detect-video`.
     """
-    run, parts = _prepare(source, settings, detector, tracker, steps)
+    run, parts = _prepare(source, options)
     requested = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
     run = replace(run, outputs=run.outputs + requested, overwrite=overwrite or run.overwrite)
     return run_video(run, parts, steps=reporting(progress) if progress else no_steps)
 
 
-@_named_for_python()
 def detect_image(
     source: PathName,
     image: PathName | None = None,
@@ -337,7 +292,6 @@ def detect_image(
     return result.detections
 
 
-@_named_for_python()
 def count(
     tracks: PathName | Iterable[FrameTracks | FrameResult],
     settings: Settings,
@@ -388,31 +342,24 @@ def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = No
     return score_files(Path(tracks), Path(truth), until).scores
 
 
-def _prepare(
-    source: PathName | Run,
-    settings: Settings | None,
-    detector: AnyDetector | None,
-    tracker: AnyTracker | None,
-    steps: Sequence[Step],
-    *,
-    start: Seconds | None = None,
-    end: Seconds | None = None,
-    frames: int | None = None,
-) -> tuple[Run, Parts]:
+def _prepare(source: PathName | Run, options: RunOptions) -> tuple[Run, Parts]:
     """Return the run and its parts; a `Run` has its own settings and part of the video."""
+    if unknown := options.keys() - RunOptions.__annotations__.keys():
+        known = ", ".join(RunOptions.__annotations__)
+        raise ArgumentTypeError(f"{min(unknown)}: unknown option; known: {known}")
     if isinstance(source, Run):
-        arguments = {"settings": settings, "start": start, "end": end, "frames": frames}
-        for name, value in arguments.items():
-            if value is not None:
+        for name in ("settings", "start", "end", "frames"):
+            if options.get(name) is not None:
                 raise ArgumentError(f"{name}: a Run has its own; remove it")
-        run, settings = source, source.settings
+        run = source
     else:
-        run = Run(Path(source), start=_exact(start), end=_exact(end), frames=frames)
-    effective, parts = _choose(settings, detector, tracker)
-    return replace(run, settings=effective), replace(parts, steps=steps)
+        start, end = _exact(options.get("start")), _exact(options.get("end"))
+        run = Run(Path(source), start=start, end=end, frames=options.get("frames"))
+    settings = source.settings if isinstance(source, Run) else options.get("settings")
+    effective, parts = _choose(settings, options.get("detector"), options.get("tracker"))
+    return replace(run, settings=effective), replace(parts, steps=options.get("steps", ()))
 
 
-@_named_for_python()
 def _choose(
     settings: Settings | None, detector: AnyDetector | None, tracker: AnyTracker | None = None
 ) -> tuple[Settings, Parts]:

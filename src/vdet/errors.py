@@ -6,7 +6,7 @@ A message is one line (a `ConfigError` has one for each mistake): what is wrong,
 do.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 
@@ -23,17 +23,47 @@ def failure_code(failed: int, inputs: int) -> int:
     return SOME_FAILED if failed < inputs else VdetError.exit_code
 
 
+_PARAMETERS = {
+    "overwrite": "use overwrite=True to replace it",
+    "skip_existing": "use overwrite=True to replace it, or skip_existing=True to keep it",
+    "rate": "pass the frame rate, as in rate=25",
+    "size": "pass the size of the frames, as in size=(1280, 720)",
+}
+"""How a parameter fixes an error in Python, by the `field` of the error."""
+
+_OPTIONS = {
+    "overwrite": "use --overwrite to replace it",
+    "skip_existing": "use --overwrite to replace it, or --skip-existing to keep it",
+    "rate": "pass the frame rate, as in --rate 25",
+    "size": "pass the size of the frames, as in --size 1280x720",
+}
+"""The same for the options of the command line."""
+
+
 class VdetError(Exception):
-    """An error that the user can understand and fix."""
+    """An error that the user can understand and fix.
+
+    Its text is for Python, that of `in_one_line` for the command line. `field` is the parameter or
+    option that fixes it; None if the message already says what to do.
+    """
 
     exit_code = 1
+
+    def __init__(self, *lines: object, field: str | None = None) -> None:
+        super().__init__(*lines)
+        self.field = field
+
+    def __str__(self) -> str:
+        return self.text(_PARAMETERS)
+
+    def text(self, advice: Mapping[str, str]) -> str:
+        """Return its lines, and what to do, by `field`."""
+        lines = "\n".join(map(str, self.args))
+        return f"{lines}; {advice[self.field]}" if self.field else lines
 
 
 class ConfigError(VdetError, ValueError):
     """Settings are wrong; each argument is one mistake, and one line of the message."""
-
-    def __str__(self) -> str:
-        return "\n".join(self.args)
 
 
 class ArgumentError(VdetError, ValueError):
@@ -104,7 +134,7 @@ _NO_MEMORY = "failed to map segment"  # the system, when there is no memory to l
 def in_one_line(error: Exception) -> str:
     """Describe any error in one line; anything but a `VdetError` or an `OSError` is a bug."""
     if isinstance(error, VdetError):
-        return str(error)
+        return error.text(_OPTIONS)
     if isinstance(error, OSError):
         return f"{error.filename or 'reading or writing'}: {error.strerror or error}"
     if isinstance(error, MemoryError) or _NO_MEMORY in str(error):

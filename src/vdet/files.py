@@ -139,7 +139,7 @@ class OutputFiles:
         if os.path.lexists(path):
             self._check_replaceable(path)
             if not self._overwrite:
-                raise OutputError(f"{path}: already exists; use --overwrite to replace it")
+                raise OutputError(f"{path}: already exists", field="overwrite")
         if not folder.is_dir():
             problem = "is not a folder" if folder.exists() else "does not exist; create it first"
             raise OutputError(f"{path}: the folder {folder} {problem}")

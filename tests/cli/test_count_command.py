@@ -52,7 +52,7 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
     assert events_of(again) == events_of(live) != []
     if form != "txt":
         result = run("count", tracks, *lines, "--rate", "25")
-        assert "--rate changes nothing: the tracks have times; remove it" in result.err
+        assert "rate: changes nothing, because the tracks have times; remove it" in result.err
 
 
 @pytest.mark.parametrize("form", ["jsonl", "coco.json"])
@@ -246,7 +246,7 @@ def test_fractions_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None
     lines.write_text("traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}")
     result = run("count", tracks, "-c", lines)
     assert result.code == 1
-    assert "pass --size, such as 1280x720" in result.err
+    assert "pass the size of the frames, as in --size 1280x720" in result.err
     result = run("count", tracks, "-c", lines, "--size", "320x240", code=0)
     assert result.out.split()[6:9] == ["gate", "left", "1"]
 

@@ -19,7 +19,7 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
     results.print(["F1"], {"f1": 0.5}, lambda: "precious")
     one, other = ResultFiles(str(target), overwrite=False), ResultFiles(None, False, folder)
     for kept in (results, one, other):
-        with pytest.raises(OutputError, match="already exists; use --overwrite"):
+        with pytest.raises(OutputError, match="already exists; use overwrite=True"):
             kept.check(NO_FILES)
     ResultFiles(str(target), page=folder, overwrite=True).check(NO_FILES)
     with pytest.raises(OutputError, match="is an input of this run"):

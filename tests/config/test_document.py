@@ -40,7 +40,7 @@ def test_any_text_is_a_document_or_refused_line_by_line(text: str) -> None:
     try:
         parse_assignment(text)
     except ConfigError as error:
-        assert str(error).startswith("--set")  # noqa: PT017
+        assert str(error).startswith("assignments")  # noqa: PT017
 
 
 def test_every_key_has_the_place_where_it_or_the_nearest_thing_around_it_stands() -> None:
@@ -56,7 +56,7 @@ def test_every_key_has_the_place_where_it_or_the_nearest_thing_around_it_stands(
     assert {key: document.position_of(key) for key in places} == {
         key: f"my.yaml:{place}" for key, place in places.items()
     }
-    assert parse_assignment("a.b.c=1").position_of(("a",)) == "--set"
+    assert parse_assignment("a.b.c=1").position_of(("a",)) == "assignments"
     assert parse_document("", "empty.yaml").position_of(("a",)) == "empty.yaml"
 
 
@@ -139,13 +139,13 @@ def test_an_assignment_is_a_document_of_one_key(text: str, values: object) -> No
     ("text", "message"),
     [
         *(
-            (text, f"--set {text}: expected KEY=VALUE, as in output.crf=18")
+            (text, f"assignments: {text}: expected KEY=VALUE, as in output.crf=18")
             for text in ("", "heat.frames", "=3", "heat..frames=3", ".a=1")
         ),
-        ("heat=[", "--set:1:2: is not YAML"),
-        ("heat=*x", "--set:1:1: is not YAML: aliases (*name) are not accepted; quote"),
-        ("heat={a: 1, a: 2}", "--set:1:8: is not YAML: a appears twice"),
-        ("heat=\ud800", "--set: is not YAML: unacceptable character"),
+        ("heat=[", "assignments:1:2: is not YAML"),
+        ("heat=*x", "assignments:1:1: is not YAML: aliases (*name) are not accepted; quote"),
+        ("heat={a: 1, a: 2}", "assignments:1:8: is not YAML: a appears twice"),
+        ("heat=\ud800", "assignments: is not YAML: unacceptable character"),
     ],
 )
 def test_an_assignment_needs_a_whole_key_and_a_value_in_yaml(text: str, message: str) -> None:

@@ -81,7 +81,7 @@ NOT_OF_MOTION = "unknown setting of tracker.kind: motion; known settings: kind, 
         (
             "tracker: {kind: rules}",
             ("tracker.kind=motion", "tracker.history=3"),
-            f"--set: tracker.history: {NOT_OF_MOTION}",
+            f"assignments: tracker.history: {NOT_OF_MOTION}",
         ),
         ("tracker: {kind: best}", (), "my.yaml:1:1: tracker: best: unknown tracker; known: mot"),
         ("tracker: {kind: [1]}", (), "my.yaml:1:1: tracker: [1]: unknown tracker; known: motion"),
@@ -175,5 +175,5 @@ class TestOtherPackages:
     def test_all_kinds_and_their_keys_are_known_and_a_broken_package_is_named(
         self, assignment: str, words: str
     ) -> None:
-        with pytest.raises(ConfigError, match=f"^--set: detector{words}"):
+        with pytest.raises(ConfigError, match=f"^assignments: detector{words}"):
             load_settings((), [f"detector.{assignment}"])

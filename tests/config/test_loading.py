@@ -46,7 +46,7 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         "train:\n  svm: {C: -1}\ntrakcer: {}\n"
     )
     assert sorted(refusal(path, text, "output.crf=99")) == [
-        "--set: output.crf: must be less than or equal to 51 (got 99)",
+        "assignments: output.crf: must be less than or equal to 51 (got 99)",
         "my.yaml:1:19: detector.heat.frames: must be greater than or equal to 1 (got 0)",
         "my.yaml:1:30: detector.heat.votes: must be greater than or equal to 0 (got -1)",
         "my.yaml:1:61: detector.search.windows[0].bottom: is required",
@@ -105,7 +105,7 @@ def test_a_mistake_in_an_assignment_is_explained_in_one_line(
     path: Path, assignment: str, message: str
 ) -> None:
     (line,) = refusal(path, "", assignment)
-    assert line.startswith(f"--set: {message}")
+    assert line.startswith(f"assignments: {message}")
 
 
 def test_a_shipped_config_is_found_by_its_name_and_another_by_its_path(

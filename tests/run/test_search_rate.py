@@ -180,7 +180,7 @@ def test_frames_that_are_not_searched_have_no_detections_and_tracks_between() ->
 
 def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:
     results = followed(3, 6)
-    with pytest.raises(OutputError, match=r"no frame at 0\.00 s or later; use an earlier --at"):
+    with pytest.raises(OutputError, match=r"no frame at 0\.00 s or later; use an earlier time"):
         write(Output("stages", tmp_path / "stages"), results[1:3])
     assert not (tmp_path / "stages").exists()
     write(Output("stages", tmp_path / "stages"), results[1:4])

@@ -162,7 +162,7 @@ def test_a_name_and_metadata_that_disagree_are_both_said(
     assert str(found) == "2026-05-01 07:00:00+02:00 (from its name)"
     other = parse_date_time(created).astimezone().isoformat(" ", "seconds")
     said = f"begins 2026-05-01 07:00:00+02:00 by its name, {other} by its metadata"
-    expected = f"clips/20260501_070000.mp4: {said}; using the name; --begin overrides it"
+    expected = f"clips/20260501_070000.mp4: {said}; using the name; input.begin overrides it"
     assert caplog.messages == [expected] * is_said
     caplog.clear()
     clock_of("20260501_070000.mp4", "2026-05-01 07:00", created)
@@ -182,7 +182,7 @@ def test_the_creation_time_of_an_exported_file_is_doubtful(
     created = clock_of("a.mp4", None, "2026-05-01T05:00:00Z", exporter="HandBrake 1.6.1")
     text = "2026-05-01 07:00:00+02:00 (its creation time, perhaps of an export)"
     assert str(created) == text
-    assert caplog.messages == [f"clips/a.mp4: may not begin {text}; --begin overrides it"]
+    assert caplog.messages == [f"clips/a.mp4: may not begin {text}; input.begin overrides it"]
 
 
 def test_the_clock_of_tracks_is_as_doubtful_as_that_of_their_video(
@@ -194,8 +194,8 @@ def test_the_clock_of_tracks_is_as_doubtful_as_that_of_their_video(
     live = run("detect-video", video, "--no-video", "--tracks", tracks, code=0)
     again = run("count", tracks, "-c", lines, "--size", "160x96", code=0)
     text = "2026-05-01 07:00:00+02:00 (its creation time, perhaps of an export)"
-    assert f"{video}: may not begin {text}; --begin overrides it" in live.err
-    assert f"{tracks}: may not begin {text}; --begin overrides it" in again.err
+    assert f"{video}: may not begin {text}; input.begin overrides it" in live.err
+    assert f"{tracks}: may not begin {text}; input.begin overrides it" in again.err
 
 
 def test_the_key_of_apple_has_the_zone_and_is_not_of_an_export(tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ class TestSeveralVideos:
         several = [crossing(EAST), replace(crossing(EAST), events=())]
         (row,) = flow_table(several)
         assert (row.start, row.end, row.count) == (None, None, 1)
-        with pytest.raises(ConfigError, match=r"pass --begin"):
+        with pytest.raises(ConfigError, match=r"set input.begin"):
             flow_table(several, 300)
 
     def test_the_use_of_a_zone_is_a_mean_over_the_time_of_video(self) -> None:

@@ -128,8 +128,8 @@ def _check_outputs(run: Run, inputs: FileIds) -> None:
         files = OutputFiles(overwrite=run.overwrite, inputs=inputs)
         check_sinks(run.outputs, files, makes_folder=True)
     except OutputError as error:
-        text = str(error).replace("to replace it", "to replace it, or --skip-existing to keep it")
-        raise OutputError(text) from error
+        error.field = error.field and "skip_existing"
+        raise
 
 
 def _named(output: Output, video: Path) -> Output:

@@ -94,9 +94,7 @@ def allow_replacing(run: Run, written: WrittenByPath) -> Run:
     for output in run.outputs:
         state, versions = output_state(output), written.get(os.path.realpath(output.path), ())
         if state and state[0] and state not in {version.state for version in versions}:
-            raise BatchError(
-                f"{output.path}: has changed since vdet wrote it; remove it, or use --overwrite"
-            )
+            raise BatchError(f"{output.path}: has changed since vdet wrote it", field="overwrite")
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 
 

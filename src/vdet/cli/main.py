@@ -42,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except Exception as error:
         code = error.exit_code if isinstance(error, VdetError) else VdetError.exit_code
-        lines = error.args if isinstance(error, ConfigError) else [in_one_line(error)]
+        is_list = isinstance(error, ConfigError) and len(error.args) > 1
+        lines = error.args if is_list else [in_one_line(error)]
         return _print_error(lines, code)
     return code if isinstance(code, int) else 0
 

@@ -204,9 +204,11 @@ class SettingsSource:
             from vdet.config.schema import Settings
 
             return Settings()  # without YAML
+        from vdet.config.document import parse_assignment
         from vdet.config.loading import load_settings
 
-        return load_settings(self.files, self.changes, self.options, detector=detector)
+        changes = [parse_assignment(text, "--set") for text in self.changes]
+        return load_settings(self.files, options=[*changes, *self.options], detector=detector)
 
 
 def settings_options(**keys: str) -> Callable[[Function], Function]:

@@ -138,8 +138,8 @@ def parse_document(text: str, name: str) -> Document:
     return Document(name, values or {}, positions)
 
 
-def parse_assignment(text: str) -> Document:
-    """Parse `key.key=value`, as `--set` accepts it.
+def parse_assignment(text: str, name: str = "assignments") -> Document:
+    """Parse `key.key=value`; `name` says where it is from, in messages.
 
     Raises
     ------
@@ -149,9 +149,9 @@ def parse_assignment(text: str) -> Document:
     key, equals, value = text.partition("=")
     path: Key = tuple(key.strip().split("."))
     if not equals or not all(path):
-        raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
-    parsed, positions = _parse(value, "--set")
-    return given(path, parsed, "--set", positions)
+        raise ConfigError(f"{name}: {text}: expected KEY=VALUE, as in output.crf=18")
+    parsed, positions = _parse(value, name)
+    return given(path, parsed, name, positions)
 
 
 def given(path: Key, value: Any, option: str, keys: Iterable[Key] = ()) -> Document:

@@ -57,7 +57,7 @@ def load_settings(
 ) -> Settings:
     """Read settings: defaults, then the files at `paths`, then assignments such as `output.crf=18`.
 
-    `options` are the values of other options of the command line, after the assignments.
+    `options` are values from the command line, after the assignments.
     `detector` is the kind of detector if no layer chooses one, or a model file, which tells the
     kind; None for the default.
 
@@ -72,7 +72,7 @@ def load_settings(
         One line for each mistake, with file, line, column, key and what was expected.
     """
     single = [*map(document.parse_assignment, assignments), *options]
-    assigned = reduce(_over, single, Document("--set", {}))
+    assigned = reduce(_over, single, Document("assignments", {}))
     layers = [*map(_read_layer, paths), _with_sizes(assigned)]
     for layer in layers:
         if isinstance(model := inside(layer.values, "detector", "model"), str):

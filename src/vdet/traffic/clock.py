@@ -125,7 +125,7 @@ def find_clock(
         raise ConfigError(f"{path}: its first frame is at {start:g} s; times must be in seconds")
     found_clock = Clock(_utc(begin, zone) - timedelta(seconds=start), source, zone, start)
     if found_clock.is_doubtful:
-        _log.warning("%s: may not begin %s; --begin overrides it", path, found_clock)
+        _log.warning("%s: may not begin %s; input.begin overrides it", path, found_clock)
     return found_clock
 
 
@@ -151,8 +151,8 @@ def _begin_by_name(
         later = _utc(written, zone) - _utc(named, zone)
         if min(abs(later), abs(later - timedelta(seconds=float(length or 0)))) > _SAME:
             _log.warning(
-                "%s: begins %s by its name, %s by its metadata; using the name; --begin overrides "
-                "it",
+                "%s: begins %s by its name, %s by its metadata; using the name; input.begin "
+                "overrides it",
                 path,
                 _text(_utc(named, zone).astimezone(zone)),
                 _text(_utc(written, zone).astimezone(zone)),
@@ -296,7 +296,7 @@ class Intervals:
             self._zeros = [end - spans[-1][1] for end, (_, spans) in zip(ends, videos, strict=True)]
         else:
             message = "intervals over several videos need the time at which each begins"
-            raise ConfigError(f"{message}; pass --begin")
+            raise ConfigError(f"{message}; set input.begin")
         self._spans = [
             [(zero + first, zero + last) for first, last in spans]
             for zero, (_, spans) in zip(self._zeros, videos, strict=True)

@@ -90,7 +90,7 @@ def count_files(
         saved = read_tracks(path, size=size)
         if not saved.has_times:
             if rate is None:
-                raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
+                raise TruthError(f"{path}: has no times", field="rate")
             saved, rate_is_used = saved.at_rate(rate), True
         clock = clock_of_head
         if len(order) == 1:
@@ -99,7 +99,7 @@ def count_files(
         recording.add(path, saved, clock, _frame_size(settings, size or saved.size))
         advance(1)
     if not rate_is_used:
-        raise ConfigError("--rate changes nothing: the tracks have times; remove it")
+        raise ConfigError("rate: changes nothing, because the tracks have times; remove it")
     reviews = by_video(corrections, names, settings.traffic)
     return apply_corrections(recording.counts(), reviews, settings.classes)
 
@@ -133,7 +133,7 @@ def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, 
         raise ConfigError("no lines or zones to count at; add them to the settings")
     if size := size or settings.camera.size:
         return size
-    raise ConfigError("the lines are fractions of the frame; pass --size, such as 1280x720")
+    raise ConfigError("the lines are fractions of the frame", field="size")
 
 
 @dataclass(slots=True)

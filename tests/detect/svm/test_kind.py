@@ -33,7 +33,7 @@ def test_every_shipped_config_has_a_shipped_model(name: str, length: int) -> Non
 
 
 def test_features_that_no_shipped_model_has_are_refused_with_advice() -> None:
-    with pytest.raises(ModelError, match=r"no shipped model .* pass --model, or train one"):
+    with pytest.raises(ModelError, match=r"no shipped model .* set detector.model, or train one"):
         shipped_model(SvmSettings(features=OTHER))
 
 

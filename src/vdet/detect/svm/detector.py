@@ -207,7 +207,7 @@ def shipped_model(settings: SvmSettings) -> Path:
     for path in sorted(_MODELS.glob("*.npz")):
         if load_model(path).features == settings.features:
             return path
-    raise ModelError("no shipped model has these features; pass --model, or train one")
+    raise ModelError("no shipped model has these features; set detector.model, or train one")
 
 
 def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:

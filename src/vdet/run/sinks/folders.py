@@ -50,7 +50,7 @@ class StagesSink(BaseSink):
         if not self._is_done:
             source = self.context.video.path if self.context.video else self.path
             at = float(self.context.at)
-            raise OutputError(f"{source}: no frame at {at:.2f} s or later; use an earlier --at")
+            raise OutputError(f"{source}: no frame at {at:.2f} s or later; use an earlier time")
 
     def write(self, result: FrameResult) -> None:
         """Write the images if this is the frame."""

@@ -50,7 +50,7 @@ class SinkContext:
     start, end
         That part, seconds from the first frame; None: no limit.
     at
-        The option `--at`: seconds from the first frame.
+        `Run.at`: seconds from the first frame.
     outputs
         All outputs of the run, for a sink that refers to another.
     traffic
