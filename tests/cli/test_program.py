@@ -18,7 +18,7 @@ from vdet.cli.messages import print_lines
 def test_the_version_is_in_the_changelog(run: Run) -> None:
     assert run("--version").out == f"vdet, version {vdet.__version__}\n"
     changelog = Path(__file__).parents[2] / "CHANGELOG.md"
-    assert vdet.__version__ in re.findall("^## (.*)", changelog.read_text("utf-8"), re.MULTILINE)
+    assert vdet.__version__ in re.findall(r"^## (\S+)", changelog.read_text("utf-8"), re.MULTILINE)
 
 
 def test_debug_shows_the_traceback(
