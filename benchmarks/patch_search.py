@@ -9,7 +9,7 @@ from vdet.boxes import Float32Array
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.search import FramePyramid
-from vdet.detect.svm.windows import WINDOW_SIDES, Strip, WindowGrid
+from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, WindowGrid
 
 
 class PatchSearch:
@@ -24,7 +24,7 @@ class PatchSearch:
         """Search a frame as `DenseSearch.search`."""
         side, regression = self._model.features.patch, self._model.box_regression
         patches = (
-            frame.cut(Strip(slice(y, y + height), slice(x, x + width), side, side))
+            frame.cut(FrameStrip(slice(y, y + height), slice(x, x + width), side, side))
             for x, y, width, height in self._boxes
         )
         vectors = np.stack([self._extractor.describe_channels(patch) for patch in patches])

@@ -16,7 +16,7 @@ import onnx
 from onnx import numpy_helper
 
 from benchmarks.unseen import OURS
-from vdet.config.classes import our_name
+from vdet.config.classes import standard_class
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
@@ -104,7 +104,7 @@ def ship(
         found = values.get(OURS) or values.get(str(weights), {})
         if "calibration" not in found:
             raise DataError(f"{results}: has no calibration for {weights}")
-        names = {name: our_name(name) or name for name in header.classes}
+        names = {name: standard_class(name) or name for name in header.classes}
         fitted = found["by_class"]
         by_class = {name: fitted[ours] for name, ours in names.items() if ours in fitted}
         calibrated = {"calibration": found["calibration"], "by_class": by_class}

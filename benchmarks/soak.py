@@ -166,7 +166,7 @@ def main() -> None:
         loop_video(find_video(folder), folder / "long.mp4", frames)
         outputs = (Output("video", folder / "out.mp4"), Output("tracks", folder / "out.jsonl"))
         run = Run(folder / "long.mp4", outputs, frames=frames)
-        totals = run_video(run, steps=monitor)
+        totals = run_video(run, progress=monitor)
     print(file=sys.stderr)
     print("\n".join(table(monitor.samples)))
     first, last = tenths(monitor.samples)

@@ -21,12 +21,12 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 from vdet.boxes import BoolArray, Float64Array, Image, Int64Array
-from vdet.config.classes import OUR_NAMES, UNKNOWN
+from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import NetworkDetector
-from vdet.detect.onnx.recognition import Calibration, Header, read_header
+from vdet.detect.onnx.recognition import Header, ScoreCalibration, read_header
 from vdet.detect.onnx.session import Session
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame
@@ -194,7 +194,7 @@ def ranked(rows: Sequence[Finding], right: Sequence[bool], objects: int) -> Rank
     return RankedPredictions(scores[order], np.array([right], np.bool_)[:, order], objects)
 
 
-def fit(rows: Sequence[Finding], given: Calibration) -> Calibration:
+def fit(rows: Sequence[Finding], given: ScoreCalibration) -> ScoreCalibration:
     """Fit slope and offset anew, so that the score is the fraction of boxes that are right.
 
     `given` is the calibration of the network that gave the scores.
@@ -207,7 +207,7 @@ def fit(rows: Sequence[Finding], given: Calibration) -> Calibration:
     logits: Float64Array = np.log(scores / (1 - scores))
     model = LogisticRegression(C=1e6).fit(logits[:, np.newaxis], right)
     slope, offset = float(model.coef_[0, 0]), float(model.intercept_[0])
-    return Calibration(
+    return ScoreCalibration(
         slope=round(slope * given.slope, 4), offset=round(slope * given.offset + offset, 4)
     )
 
@@ -226,12 +226,14 @@ def summarize(findings: Findings) -> dict[str, Any]:
     }
     classes = {
         name: _scores([row for row in by_class[name] if row.found != UNKNOWN], name, totals[name])
-        for name in sorted(by_class.keys() - {UNKNOWN}, key=(*OUR_NAMES, *sorted(by_class)).index)
+        for name in sorted(
+            by_class.keys() - {UNKNOWN}, key=(*STANDARD_CLASSES, *sorted(by_class)).index
+        )
     }
     return {"sets": sets, "classes": classes}
 
 
-def calibrate(findings: Findings, given: Calibration) -> dict[str, Any]:
+def calibrate(findings: Findings, given: ScoreCalibration) -> dict[str, Any]:
     """Return the calibrations of all boxes and of each class with enough of them, as JSON values.
 
     `given` is the calibration of the network that gave the scores.

@@ -60,14 +60,14 @@ def imports_of(path: Path, *, at_start: bool = False) -> Iterator[str]:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     for node in tree.body if at_start else ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (_without_vdet(alias.name) for alias in node.names if _ours(alias.name))
+            yield from (_without_vdet(alias.name) for alias in node.names if _of_vdet(alias.name))
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are absolute here"
-            if node.module and _ours(node.module):
+            if node.module and _of_vdet(node.module):
                 yield from (_imported(node.module, alias.name) for alias in node.names)
 
 
-def _ours(module: str) -> bool:
+def _of_vdet(module: str) -> bool:
     return module.split(".", maxsplit=1)[0] == "vdet"
 
 

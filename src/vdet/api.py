@@ -41,7 +41,7 @@ from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks
 from vdet.media import Picture
 from vdet.media.images import read_image
-from vdet.progress import no_steps, reporting
+from vdet.progress import no_progress, reporting
 from vdet.run.images import ImageJob, ImageSearch, run_images
 from vdet.run.inputs import input_files
 from vdet.run.loop import Parts
@@ -265,7 +265,7 @@ def detect_video(
     run, parts = _prepare(source, options)
     requested = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
     run = replace(run, outputs=run.outputs + requested, overwrite=overwrite or run.overwrite)
-    return run_video(run, parts, steps=reporting(progress) if progress else no_steps)
+    return run_video(run, parts, progress=reporting(progress) if progress else no_progress)
 
 
 def detect_image(

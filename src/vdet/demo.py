@@ -18,7 +18,7 @@ from vdet.labels.reading import read_tracks, read_truth
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import MiningLimits, VideoSource, mine
 from vdet.learn.svm.training import train
-from vdet.progress import Steps
+from vdet.progress import Progress
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 from vdet.synthetic.render import write_clip
@@ -54,7 +54,12 @@ _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 
 def run_demo(
-    folder: Path, *, seed: int, overwrite: bool, announce: Callable[[str], object], steps: Steps
+    folder: Path,
+    *,
+    seed: int,
+    overwrite: bool,
+    announce: Callable[[str], object],
+    progress: Progress,
 ) -> list[str]:
     """Render two roads, detect and count their vehicles, and compare them with the ground truth.
 
@@ -68,7 +73,7 @@ def run_demo(
         Replace the files of an earlier demo.
     announce
         Called with a line of text before each part.
-    steps
+    progress
         Called at the start of each longer step.
 
     Returns
@@ -86,12 +91,12 @@ def run_demo(
     def find(clip: str, outputs: dict[str, str], settings: Settings) -> None:
         paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
         run = Run(folder / clip, paths, settings, at=middle, overwrite=overwrite)
-        run_video(run, steps=steps)
+        run_video(run, progress=progress)
 
     scene, pole, rng = demo_scene(seed), pole_scene(seed), np.random.default_rng(seed)
     middle = scene.frames / scene.rate / 2
     announce("1/4 drawing two synthetic roads with vehicles …")
-    steps("drawing", None)
+    progress("drawing", None)
     draw(scene, folder / ROAD, folder / TRUTH)
     draw(pole, folder / POLE, folder / POLE_TRUTH)
     write_whole(folder / GATE, _GATE, overwrite=overwrite)
@@ -107,8 +112,16 @@ def run_demo(
     for source in sources:
         draw(busy_road(rng), source.path, source.truth)
     model = load_svm(linear.svm, None)  # only the positions of its windows matter
-    mine(sources, folder / PATCHES, linear, model, limits=_LIMITS, overwrite=overwrite, steps=steps)
-    learnt, _ = train(find_patches([folder / PATCHES]), linear, steps=steps)
+    mine(
+        sources,
+        folder / PATCHES,
+        linear,
+        model,
+        limits=_LIMITS,
+        overwrite=overwrite,
+        progress=progress,
+    )
+    learnt, _ = train(find_patches([folder / PATCHES]), linear, progress=progress)
     save_model(learnt, folder / MODEL, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
     chosen = linear.svm.model_copy(update={"model": str(folder / MODEL)})

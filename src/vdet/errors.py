@@ -154,12 +154,12 @@ def printable(name: str) -> str:
     return shown if len(shown) <= _MAX_SHOWN else f"{shown[:_MAX_SHOWN]}…"
 
 
-def counted(count: int, noun: str) -> str:
+def quantity(count: int, noun: str) -> str:
     """Return `1 car`, `6 buses`, `2 people`."""
-    return f"{count:,} {named(count, noun)}"
+    return f"{count:,} {plural(count, noun)}"
 
 
-def named(count: int, noun: str) -> str:
+def plural(count: int, noun: str) -> str:
     """Return the noun for a number of things: `car`, `cars`, `buses`, `lorries`, `people`."""
     if count == 1:
         return noun

@@ -6,19 +6,19 @@ from collections.abc import Callable
 Advance = Callable[[int], object]
 """Called with the number of items done since the last call."""
 
-Steps = Callable[[str, int | None], Advance]
-"""Called at the start of each step of the work: its name, empty if there is only one, and the
+Progress = Callable[[str, int | None], Advance]
+"""Called at the start of each stage of the work: its name, empty if there is only one, and the
 expected number of items, None if it is unknown.
 """
 
 
-def no_steps(_: str, __: int | None) -> Advance:
+def no_progress(_: str, __: int | None) -> Advance:
     """Show no progress."""
     return lambda _: None
 
 
-def reporting(report: Callable[[int, int | None], object]) -> Steps:
-    """Return `Steps` that call a function with the number of items done and the total."""
+def reporting(report: Callable[[int, int | None], object]) -> Progress:
+    """Return a `Progress` that calls a function with the number of items done and the total."""
 
     def begin(_: str, total: int | None) -> Advance:
         done = itertools.count(1)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from vdet.batch.manifest import Record, Written, open_manifest, read_batch
+from vdet.batch.manifest import ManifestRecord, Written, open_manifest, read_batch
 from vdet.errors import OutputError
 
-RECORD = Record(
+RECORD = ManifestRecord(
     "/in/a.mp4",
     "2026-01-02T03:04:05+00:00",
     seconds=1.5,
@@ -50,7 +50,7 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
 
 def test_names_of_any_kind_can_be_recorded(tmp_path: Path) -> None:
     path = tmp_path / "manifest.jsonl"
-    odd = Record("/in/\udcff \n\U0001f697.mp4", "now", error="\udcff: bad")
+    odd = ManifestRecord("/in/\udcff \n\U0001f697.mp4", "now", error="\udcff: bad")
     with open_manifest(tmp_path) as add:
         add(odd)
     (line,) = lines(path)

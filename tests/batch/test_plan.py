@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.batch.manifest import Record, Written, open_manifest
+from vdet.batch.manifest import ManifestRecord, Written, open_manifest
 from vdet.batch.run import Plan, make_plan
 from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import Output, data
@@ -73,7 +73,7 @@ def record(source: str, *paths: str) -> None:
 
 def note(source: str, *outputs: Output, made_by: str = "") -> None:
     """Add a record of outputs to the manifest."""
-    made = Record(
+    made = ManifestRecord(
         source,
         "now",
         outputs=tuple(

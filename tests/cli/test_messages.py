@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from conftest import Run
 from running import write_drive
-from vdet.cli.messages import LOG, is_quiet, progress_steps
+from vdet.cli.messages import LOG, is_quiet, progress_bars
 
 
 class Terminal(io.StringIO):
@@ -34,10 +34,10 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
 
 def test_each_step_ends_the_bar_of_the_one_before(terminal: Terminal) -> None:
-    with progress_steps(" patches") as steps:
-        steps("fitting", None)
+    with progress_bars(" patches") as progress:
+        progress("fitting", None)
         assert "fitting …" in terminal.getvalue()
-        steps("describing", 3)(3)
+        progress("describing", 3)(3)
     assert "fitting" not in terminal.getvalue().rpartition("\r")[2]
     assert "describing: 100%" in terminal.getvalue()
     assert "3/3" in terminal.getvalue()
@@ -79,6 +79,6 @@ class TestNamesThatControlATerminal:
 
 def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
     LOG.setLevel(logging.ERROR)
-    with progress_steps("") as steps:
-        steps("fitting", None)
+    with progress_bars("") as progress:
+        progress("fitting", None)
     assert terminal.getvalue() == ""

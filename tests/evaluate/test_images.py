@@ -48,7 +48,7 @@ def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledImages:
 
 def test_results_do_not_depend_on_threads(red_set: LabelledImages, model: SvmModel) -> None:
     done: list[int] = []
-    alone = evaluate_images([red_set], model, COUNTING, steps=lambda *_: done.append)
+    alone = evaluate_images([red_set], model, COUNTING, progress=lambda *_: done.append)
     together = evaluate_images([red_set], model, COUNTING, threads=3)
     assert done == [1] * 6
     images = [result.sources[0].images for result in (alone, together)]

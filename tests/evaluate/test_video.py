@@ -12,7 +12,7 @@ from vdet.detect.factory import load_detector
 from vdet.errors import TruthError
 from vdet.evaluate.video import ClipResult, evaluate_video
 from vdet.labels.reading import read_truth
-from vdet.progress import Steps, no_steps
+from vdet.progress import Progress, no_progress
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
 
@@ -25,10 +25,10 @@ def evaluate(clip_path: Path, model_path: Path) -> Evaluate:
     """Evaluates the clip with quick settings, changed by assignments."""
     model_setting = f"detector.model={model_path}"
 
-    def call(truth: Path, *assignments: str, progress: Steps = no_steps) -> ClipResult:
+    def call(truth: Path, *assignments: str, progress: Progress = no_progress) -> ClipResult:
         settings = load_settings((), (*QUICK, model_setting, *assignments))
         model = load_detector(settings.detector)
-        return evaluate_video(clip_path, read_truth(truth), settings, model, steps=progress)
+        return evaluate_video(clip_path, read_truth(truth), settings, model, progress=progress)
 
     return call
 

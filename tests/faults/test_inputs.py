@@ -17,7 +17,7 @@ from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VdetError
 from vdet.labels.reading import read_labelled_images
-from vdet.progress import Steps
+from vdet.progress import Progress
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
@@ -39,8 +39,8 @@ def job(clip: Path, tmp_path: Path) -> Run:
     return Run(clip, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items()))
 
 
-def after(frames: int, happens: Callable[[], object]) -> Steps:
-    """Return `Steps` that call `happens` when `frames` frames are done."""
+def after(frames: int, happens: Callable[[], object]) -> Progress:
+    """Return `Progress` that call `happens` when `frames` frames are done."""
     left = iter(range(frames))
 
     def advance(_: int) -> None:
@@ -52,7 +52,7 @@ def after(frames: int, happens: Callable[[], object]) -> Steps:
 
 def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: Run) -> None:
     run_video(
-        replace(job, settings=SETTINGS), Parts(red_model()), steps=after(5, job.source.unlink)
+        replace(job, settings=SETTINGS), Parts(red_model()), progress=after(5, job.source.unlink)
     )
     assert frames_of(job.outputs[0].path) == COUNT
 
@@ -70,7 +70,7 @@ def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
-    totals = run_video(replace(job, settings=SETTINGS), Parts(red_model()), steps=shrink)
+    totals = run_video(replace(job, settings=SETTINGS), Parts(red_model()), progress=shrink)
     assert COUNT // 4 < totals.frames < COUNT * 3 // 4
     assert frames_of(job.outputs[0].path) == totals.frames
     assert f"ends early: {totals.frames} of {COUNT} frames could be read" in caplog.text

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vdet.config.classes import OUR_NAMES
+from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.loading import load_settings
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 
@@ -33,14 +33,18 @@ def test_settings_give_words_another_role_and_add_new_ones() -> None:
 
 @pytest.mark.parametrize(
     ("classes", "vehicles"),
-    [(OUR_NAMES, OUR_NAMES), (("car",), ("car",)), (("truck", "tractor"), ("truck",))],
+    [
+        (STANDARD_CLASSES, STANDARD_CLASSES),
+        (("car",), ("car",)),
+        (("truck", "tractor"), ("truck",)),
+    ],
 )
 def test_classes_that_the_detector_does_not_look_for_are_ignored(
     classes: tuple[str, ...], vehicles: tuple[str, ...]
 ) -> None:
     roles = Roles.of({}, classes)
-    assert {name: roles.role_of(name) for name in OUR_NAMES} == {
-        name: "vehicle" if name in vehicles else "ignored" for name in OUR_NAMES
+    assert {name: roles.role_of(name) for name in STANDARD_CLASSES} == {
+        name: "vehicle" if name in vehicles else "ignored" for name in STANDARD_CLASSES
     }
     assert all(roles.role_of(name) == "vehicle" for name in classes)
 
@@ -55,7 +59,7 @@ def test_a_class_that_the_detector_finds_is_never_left_out() -> None:
 def test_a_detector_of_vehicles_looks_for_cars_trucks_and_buses() -> None:
     settings = load_settings((), ['detector.classes=["vehicle"]'])
     roles = Roles.from_settings(settings)
-    wanted = [name for name in OUR_NAMES if roles.role_of(name) == "vehicle"]
+    wanted = [name for name in STANDARD_CLASSES if roles.role_of(name) == "vehicle"]
     assert wanted == ["car", "truck", "bus", "vehicle"]
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
-from vdet.config.classes import OUR_NAMES, UNKNOWN
+from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images, write_coco_images
 from vdet.labels.formats import Format, ImageTracks, track_formats
@@ -43,7 +43,7 @@ def boxes(draw: st.DrawFn) -> Box:
     return Box.sized(x, y, right - x, bottom - y)
 
 
-CLASSES = st.sampled_from([None, *OUR_NAMES, "tractor", 'a <"b"> & c, d', "Überlandbus 🚌"])
+CLASSES = st.sampled_from([None, *STANDARD_CLASSES, "tractor", 'a <"b"> & c, d', "Überlandbus 🚌"])
 PLACES = st.floats(-3000, 3000).map(lambda value: round(value, 2))
 
 

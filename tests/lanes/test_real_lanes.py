@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vdet.config.loading import find_config, load_settings
-from vdet.lanes.calibration import Calibration, calibrate
+from vdet.lanes.calibration import LensCalibration, calibrate
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.media.images import read_image
@@ -18,12 +18,12 @@ pytestmark = pytest.mark.realdata
 
 
 @pytest.fixture(scope="module")
-def calibration(real_data: Path) -> Calibration:
+def calibration(real_data: Path) -> LensCalibration:
     return calibrate(sorted((real_data / "camera_cal").glob("*.jpg")), (9, 6))
 
 
 def test_seventeen_of_twenty_boards_are_found_and_one_of_them_is_an_outlier(
-    calibration: Calibration,
+    calibration: LensCalibration,
 ) -> None:
     reasons = {path.stem: reason for path, reason in calibration.skipped.items()}
     assert sorted(reasons) == ["calibration1", "calibration15", "calibration4", "calibration5"]
@@ -32,7 +32,7 @@ def test_seventeen_of_twenty_boards_are_found_and_one_of_them_is_an_outlier(
     assert {photo.size for photo in calibration.photos} == {(1280, 720), (1281, 721)}
 
 
-def test_the_real_camera_is_recovered(calibration: Calibration) -> None:
+def test_the_real_camera_is_recovered(calibration: LensCalibration) -> None:
     camera = calibration.camera
     assert camera.size == (1280, 720)
     assert camera.matrix[0][0] == pytest.approx(1155, abs=8)
@@ -40,11 +40,11 @@ def test_the_real_camera_is_recovered(calibration: Calibration) -> None:
     assert calibration.rms < 1.0
 
 
-def finder_of(calibration: Calibration) -> RoadFinder:
+def finder_of(calibration: LensCalibration) -> RoadFinder:
     return RoadFinder(calibration.camera, PROJECT_LANE, 1280, 720)
 
 
-def lane_in(calibration: Calibration, path: Path) -> Lane:
+def lane_in(calibration: LensCalibration, path: Path) -> Lane:
     finder = finder_of(calibration)
     lane = finder.update(finder.observe(Picture(read_image(path)))).lane
     assert lane is not None, path.name
@@ -52,7 +52,7 @@ def lane_in(calibration: Calibration, path: Path) -> Lane:
 
 
 def test_a_lane_of_the_right_width_is_found_in_every_test_picture(
-    calibration: Calibration, real_data: Path
+    calibration: LensCalibration, real_data: Path
 ) -> None:
     for number in range(1, 7):
         lane = lane_in(calibration, real_data / "lane_images" / f"test{number}.jpg")
@@ -61,7 +61,7 @@ def test_a_lane_of_the_right_width_is_found_in_every_test_picture(
         assert lane.radius is None or lane.radius > 400
 
 
-def test_the_lane_is_steady_on_pale_concrete(calibration: Calibration, real_data: Path) -> None:
+def test_the_lane_is_steady_on_pale_concrete(calibration: LensCalibration, real_data: Path) -> None:
     finder = finder_of(calibration)
     with VideoReader(real_data / "test_video.mp4") as reader:
         lanes = [finder.update(finder.observe(frame.picture)).lane for frame in reader]

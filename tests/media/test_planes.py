@@ -159,7 +159,7 @@ def test_a_part_has_the_colours_of_the_whole_also_after_it_changed(
     coding: Coding, box: Box
 ) -> None:
     picture = Picture(Planes.of_image(slopes(64, 48), coding))
-    expected, part = box.cut(picture.image).astype(int), picture.cut(box)
+    expected, part = box.cut(picture.image).astype(int), picture.deferred_crop(box)
     assert picture.planes
     picture.planes.luma[:] = 0
     np.testing.assert_allclose(part().astype(int), expected, atol=4)

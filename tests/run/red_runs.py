@@ -16,7 +16,7 @@ from vdet.findings import Findings
 from vdet.lanes.road import Road
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
-from vdet.progress import Steps, no_steps
+from vdet.progress import Progress, no_progress
 from vdet.run.loop import Parts, build, peek
 from vdet.run.result import FINDINGS, FrameResult
 from vdet.run.sinks import Output
@@ -50,11 +50,11 @@ def outputs(**paths: Path) -> tuple[Output, ...]:
 
 
 def run_red(
-    job: Run, settings: Settings = SETTINGS, *, progress: Steps = no_steps, **own: Any
+    job: Run, settings: Settings = SETTINGS, *, progress: Progress = no_progress, **own: Any
 ) -> RunTotals:
     """Run a job that finds red cars, with a tracker or steps of its own."""
     parts = Parts(model_for(settings), **own)
-    return run_video(replace(job, settings=settings), parts, steps=progress)
+    return run_video(replace(job, settings=settings), parts, progress=progress)
 
 
 def follow(

@@ -56,7 +56,7 @@ class Written:
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class ManifestRecord:
     """The result of one file.
 
     Attributes
@@ -119,7 +119,7 @@ def note_path(folder: Path, path: Path) -> Path:
     return folder / _NOTES / f"{name[:32]}.json"
 
 
-def read_records(*paths: Path) -> Iterator[Record]:
+def read_records(*paths: Path) -> Iterator[ManifestRecord]:
     """Yield the records in some files; missing files and invalid records are skipped.
 
     Raises
@@ -133,10 +133,10 @@ def read_records(*paths: Path) -> Iterator[Record]:
                 with suppress(ValueError, TypeError, KeyError, RecursionError):
                     values = json.loads(line)
                     outputs = tuple(Written(**output) for output in values["outputs"])
-                    yield Record(**{**values, "outputs": outputs})
+                    yield ManifestRecord(**{**values, "outputs": outputs})
 
 
-def read_batch(folder: Path) -> Iterator[Record]:
+def read_batch(folder: Path) -> Iterator[ManifestRecord]:
     """Yield the records of all batches in a folder, in order. Errors as for `read_records`."""
     return read_records(folder / MANIFEST, *_notes(folder))
 
@@ -146,7 +146,7 @@ def _notes(folder: Path) -> list[Path]:
 
 
 @contextmanager
-def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
+def open_manifest(folder: Path) -> Iterator[Callable[[ManifestRecord], None]]:
     """Yield a function that appends a record to the manifest and syncs it to disk.
 
     The manifest is locked: no other batch can write into the folder until the block ends. Notes
@@ -174,7 +174,7 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 os.fsync(file.fileno())
 
-        def add(record: Record) -> None:
+        def add(record: ManifestRecord) -> None:
             append(record.line)
             if record.outputs:
                 note_path(folder, Path(record.outputs[0].path)).unlink(missing_ok=True)

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from vdet.batch.inputs import InputVideo, find_sources
-from vdet.batch.manifest import MANIFEST, Record, open_manifest, read_batch
+from vdet.batch.manifest import MANIFEST, ManifestRecord, open_manifest, read_batch
 from vdet.batch.task import (
     allow_replacing,
     is_up_to_date,
@@ -163,7 +163,7 @@ def _reject_shared(runs: Iterable[Run], totals: Iterable[TotalFile], folder: Pat
 
 def run_batch(
     plan: Plan, *, workers: Workers, threads: int | None = None
-) -> Generator[tuple[Run, Record]]:
+) -> Generator[tuple[Run, ManifestRecord]]:
     """Process the files of a plan; yield each when it is done and its record is in the manifest.
 
     `threads` is the number of threads for each run that does not set it. At the end, the files over

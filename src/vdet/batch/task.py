@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 
-from vdet.batch.manifest import Record, Written, note_path, read_records
+from vdet.batch.manifest import ManifestRecord, Written, note_path, read_records
 from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import BatchError, in_one_line
@@ -63,7 +63,7 @@ def _cached_sha256(path: Path, *_state: int) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def outputs_by_path(records: Iterable[Record]) -> WrittenByPath:
+def outputs_by_path(records: Iterable[ManifestRecord]) -> WrittenByPath:
     """Return the outputs in some records."""
     outputs: dict[str, list[Written]] = {}
     for record in records:
@@ -98,7 +98,7 @@ def allow_replacing(run: Run, written: WrittenByPath) -> Run:
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 
 
-def process_file(run: Run, *, folder: Path) -> Record:
+def process_file(run: Run, *, folder: Path) -> ManifestRecord:
     """Process a video, and return its record, which is also written as a note into the folder.
 
     Errors are recorded, not raised. After its process was killed, it can be called again: the
@@ -124,7 +124,7 @@ def process_file(run: Run, *, folder: Path) -> Record:
     return record
 
 
-def _written(run: Run, record: Record, files: OutputFiles) -> Record:
+def _written(run: Run, record: ManifestRecord, files: OutputFiles) -> ManifestRecord:
     """Write the outputs, still under temporary names, and return their record."""
     digest = result_digest(run)
     detector = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
@@ -154,10 +154,10 @@ def _cached_detector(settings: bytes, _model_sha256: str | None) -> DetectorMode
     return load_detector(pickle.loads(settings))
 
 
-def new_record(run: Run) -> Record:
+def new_record(run: Run) -> ManifestRecord:
     """Return the record of a run that starts now."""
     model = model_file(run.settings.detector)
-    return Record(
+    return ManifestRecord(
         input=str(run.source.absolute()),
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         model=model.name if model else None,

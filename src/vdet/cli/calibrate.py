@@ -6,8 +6,8 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import LOG, print_lines, progress_steps
-from vdet.errors import counted
+from vdet.cli.messages import LOG, print_lines, progress_bars
+from vdet.errors import quantity
 from vdet.files import OutputFiles, file_ids
 
 
@@ -43,8 +43,8 @@ def calibrate(
     paths = list(find_images(photos))
     files = OutputFiles(overwrite=overwrite, inputs=file_ids(paths))
     files.check(output, suffixes=(".yaml", ".yml"), noun="cameras")
-    with progress_steps("") as steps:
-        steps(f"searching {counted(len(paths), 'photograph')}", None)
+    with progress_bars("") as progress:
+        progress(f"searching {quantity(len(paths), 'photograph')}", None)
         result = fit(paths, pattern)
     for path, reason in result.skipped.items():
         LOG.warning("%s: not used: %s", path, reason)

@@ -7,9 +7,9 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import LOG, announce, announce_notes, print_lines, progress_steps
-from vdet.config.classes import OUR_NAMES, our_names
-from vdet.errors import DOUBTFUL, counted
+from vdet.cli.messages import LOG, announce, announce_notes, print_lines, progress_bars
+from vdet.config.classes import STANDARD_CLASSES, standard_classes
+from vdet.errors import DOUBTFUL, quantity
 from vdet.files import OutputFiles, output_errors, write_text
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def count(
         tracks = tuple(path for path in tracks if path.name != MANIFEST)
     settings = source.load()
     if classes:  # any class that TRACKS have
-        settings = settings.model_copy(update={"classes": our_names(classes)})
+        settings = settings.model_copy(update={"classes": standard_classes(classes)})
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
@@ -88,8 +88,8 @@ def count(
     files = OutputFiles(overwrite=overwrite, inputs=inputs, is_last=True)
     check_sinks(outputs, files)
     reviews, scene = read_corrections(corrections), survey_image(settings)
-    with progress_steps(" files") as steps:
-        advance = steps("", len(tracks) if len(tracks) > 1 else None)
+    with progress_bars(" files") as progress:
+        advance = progress("", len(tracks) if len(tracks) > 1 else None)
         videos = count_files(tracks, settings, size, rate, corrections=reviews, advance=advance)
     for name, result in videos.items():
         if result.clock:
@@ -98,7 +98,7 @@ def count(
             LOG.warning("%s: %s", name, warning)
         announce_notes(name, result.findings)
     counted_classes = {event.class_name for result in videos.values() for event in result.events}
-    for name in {*our_names(classes)} - {*counted_classes, *OUR_NAMES}:
+    for name in {*standard_classes(classes)} - {*counted_classes, *STANDARD_CLASSES}:
         LOG.warning("--class %s: no vehicle of this class was counted", name)
     with files:
         for output in outputs:
@@ -147,7 +147,7 @@ def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     rows = []
     for file, directions in totals.items():
         for total in directions:
-            classes = ", ".join(counted(number, kind) for kind, number in total.classes.items())
+            classes = ", ".join(quantity(number, kind) for kind, number in total.classes.items())
             rows.append((file, total.name, total.direction, str(total.count), classes))
     return table(("file", "name", "direction", "count", "classes"), rows)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.command import command
-from vdet.cli.messages import announce, print_lines, progress_steps
+from vdet.cli.messages import announce, print_lines, progress_bars
 from vdet.cli.options import PATH, number_option, overwrite_option
 
 
@@ -28,8 +28,10 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     """
     from vdet.demo import run_demo
 
-    with progress_steps("") as steps:
-        lines = run_demo(folder, seed=seed, overwrite=overwrite, announce=announce, steps=steps)
+    with progress_bars("") as progress:
+        lines = run_demo(
+            folder, seed=seed, overwrite=overwrite, announce=announce, progress=progress
+        )
     print_lines(
         *lines,
         "",

@@ -8,8 +8,8 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import LOG, announce, print_lines, progress_steps
-from vdet.errors import ImageError, counted, failure_code
+from vdet.cli.messages import LOG, announce, print_lines, progress_bars
+from vdet.errors import ImageError, failure_code, quantity
 from vdet.files import OutputFiles
 from vdet.run.sinks import Output
 from vdet.workers import core_count
@@ -77,8 +77,8 @@ def detect_image(
     is_printed = not (output or stages or outputs)
     failed = 0
     results = run_images(jobs, outputs, search, files, threads=core_count())
-    with progress_steps(" images") as steps, closing(results):
-        advance = steps("", len(jobs))
+    with progress_bars(" images") as progress, closing(results):
+        advance = progress("", len(jobs))
         for result in results:
             if isinstance(result, ImageError):
                 LOG.error("%s", result)
@@ -97,4 +97,4 @@ def _print_vehicles(result: "FrameResult") -> None:
     for track in result.tracks:
         box = ", ".join(map(str, track.box.xywh))
         rows.append(f"  {track.class_name or 'vehicle':8} {track.score:.2f}  {box}")
-    print_lines(f"{result.source}: {counted(len(rows), 'vehicle')}", *rows)
+    print_lines(f"{result.source}: {quantity(len(rows), 'vehicle')}", *rows)

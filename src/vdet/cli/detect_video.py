@@ -12,14 +12,14 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import LOG, announce, announce_notes, progress_steps
-from vdet.errors import DOUBTFUL, OutputError, counted, failure_code
+from vdet.cli.messages import LOG, announce, announce_notes, progress_bars
+from vdet.errors import DOUBTFUL, OutputError, failure_code, quantity
 from vdet.files import file_ids
 from vdet.run.sinks import Output
 from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 if TYPE_CHECKING:
-    from vdet.batch.manifest import Record
+    from vdet.batch.manifest import ManifestRecord
     from vdet.run.video import Run
 
 STAGE_MARGIN = Fraction(2)
@@ -230,10 +230,10 @@ def _process_video(run: "Run") -> bool:
     from vdet.run.sinks.protocol import STANDARD_OUTPUT
     from vdet.run.video import run_video
 
-    with progress_steps(" frames") as steps:
-        steps("opening", None)
-        totals = run_video(run, steps=steps, is_last=True)
-    numbers = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
+    with progress_bars(" frames") as progress:
+        progress("opening", None)
+        totals = run_video(run, progress=progress, is_last=True)
+    numbers = f"{quantity(totals.frames, 'frame')}, {quantity(totals.tracks, 'track')}"
     rate = totals.frames / totals.seconds
     announce(f"{run.source}: {numbers}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
     paths = [output.path for output in run.outputs if output.path != STANDARD_OUTPUT]
@@ -273,8 +273,8 @@ def _process_videos(
         workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
     results = run_batch(plan, workers=workers, threads=max(1, cores // jobs))
     failed, is_doubtful = 0, False
-    with progress_steps(" files") as steps, closing(results):
-        advance = steps("", len(plan.runs))
+    with progress_bars(" files") as progress, closing(results):
+        advance = progress("", len(plan.runs))
         for run, record in results:
             _print_result(run, record)
             failed += record.error is not None
@@ -282,7 +282,7 @@ def _process_videos(
             advance(1)
     done, skipped = len(plan.runs) - failed, len(plan.skipped)
     also = f"{skipped} skipped, " if skipped else ""
-    announce(f"{plan.folder}: {counted(done, 'file')} done, {also}{failed} failed")
+    announce(f"{plan.folder}: {quantity(done, 'file')} done, {also}{failed} failed")
     return failure_code(failed, len(plan.runs) + skipped), is_doubtful
 
 
@@ -299,12 +299,12 @@ def _checked_ending(output: Output) -> Output:
     return Output(sink, Path(ending))
 
 
-def _print_result(run: "Run", record: "Record") -> None:
+def _print_result(run: "Run", record: "ManifestRecord") -> None:
     for warning in record.warnings:
         LOG.warning("%s", warning)
     if record.error:
         LOG.error("%s", record.error)
         return
-    numbers = f"{counted(record.frames or 0, 'frame')}, {counted(record.tracks or 0, 'track')}"
+    numbers = f"{quantity(record.frames or 0, 'frame')}, {quantity(record.tracks or 0, 'track')}"
     begin = f", begins {record.begin}" if record.begin and run.settings.traffic else ""
     announce(f"{run.source}: {numbers}, {record.seconds:.1f} s{begin}")

@@ -7,8 +7,8 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_lines, progress_steps
-from vdet.errors import counted
+from vdet.cli.messages import print_lines, progress_bars
+from vdet.errors import quantity
 from vdet.files import OutputFiles, output_errors
 
 
@@ -56,14 +56,14 @@ def draw(
     inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)
     files = OutputFiles(overwrite=overwrite, inputs=inputs, is_last=True)
     files.check(output, suffixes=(".html", ".jpg", ".png", ".svg"))
-    with progress_steps(" frames") as steps:
+    with progress_bars(" frames") as progress:
         # Without regions, because the page shows their effect.
         whole_frames = settings.model_copy(update={"regions": ()})
         run = Run(clip, settings=whole_frames, start=start, end=end)
-        image, scene = read_scene(run, tracks, steps)
+        image, scene = read_scene(run, tracks, progress)
     values = given_values(source.configs)
     drawing = Drawing(image, scene.frames, settings, values, scene.findings)
     name = Path([output.name, *source.configs][-1]).with_suffix(".yaml").name
     with files, output_errors(output):
         files.stage(output).write_bytes(drawing.output(output, name))
-    print_lines(f"{output}: written, {counted(len(drawing.paths), 'vehicle')}")
+    print_lines(f"{output}: written, {quantity(len(drawing.paths), 'vehicle')}")

@@ -7,7 +7,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import progress_steps
+from vdet.cli.messages import progress_bars
 from vdet.cli.options import ResultFiles, SettingsSource, facts_options, results_options
 from vdet.workers import core_count
 
@@ -55,8 +55,8 @@ def images(
     results.check(source.inputs(*data, *images_read, settings=settings))
     shown = settings.detector
     counting = Counting(shown.min_score_still, min_width, shown.class_minima)
-    with progress_steps(" images") as steps:
-        score = evaluate_images(sets, detector, counting, threads=core_count(), steps=steps)
+    with progress_bars(" images") as progress:
+        score = evaluate_images(sets, detector, counting, threads=core_count(), progress=progress)
     results.print_report(images_report(score, _run_name(settings, source)))
 
 
@@ -84,8 +84,8 @@ def tracks(
     results.check(source.inputs(prediction, truth))
     settings = source.load()
     options.reject_regions(settings)
-    with progress_steps("") as steps:
-        steps("comparing", None)
+    with progress_bars("") as progress:
+        progress("comparing", None)
         score = score_files(prediction, truth, until, settings)
     results.print_report(tracks_report(score, truth))
 
@@ -125,9 +125,9 @@ def video(
     results.check(source.inputs(*videos, *truths, settings=settings))
     roles = Roles.from_settings(settings)
     pairs = [(path, read_truth(truth, roles)) for path, truth in labelled]
-    with progress_steps(" frames") as steps:
+    with progress_bars(" frames") as progress:
         scores = [
-            evaluate_video(path, truth, settings, detector, steps=steps, until=until)
+            evaluate_video(path, truth, settings, detector, progress=progress, until=until)
             for path, truth in pairs
         ]
     results.print_report(video_report(scores, _run_name(settings, source)))

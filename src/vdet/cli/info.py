@@ -8,7 +8,7 @@ import click
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
 from vdet.cli.options import PATH, ResultFiles, SettingsSource, facts_options, settings_options
-from vdet.errors import ModelError, counted, printable
+from vdet.errors import ModelError, printable, quantity
 from vdet.version import __version__
 from vdet.workers import core_count
 
@@ -48,7 +48,7 @@ def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> Non
     else:
         facts = _machine()
     lines = [
-        f"{name.replace('_', ' ')}: {_text(value)}"
+        f"{name.replace('_', ' ')}: {_value_text(value)}"
         for name, value in facts.items()
         if name != "provenance"
     ]
@@ -96,13 +96,13 @@ def _camera(settings: "Settings") -> Facts:
     if ground := ground_of(settings.camera, *size):
         pixels = f"{ground.pixel_error:.1f} px, " if settings.camera.size else ""
         facts["ground"] = (
-            f"{counted(len(settings.camera.ground), 'point')}, off by {ground.error:.2f} m "
+            f"{quantity(len(settings.camera.ground), 'point')}, off by {ground.error:.2f} m "
             f"({pixels}root mean square), over {ground.length:.0f} m"
         )
     return facts
 
 
-def _text(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if isinstance(value, list):
         return "; ".join(map(printable, value)) or "none"
     if isinstance(value, bool):
@@ -124,7 +124,7 @@ def _linear_model(path: Path) -> Facts:
 
 
 def _network(path: Path) -> Facts:
-    from vdet.config.classes import our_name
+    from vdet.config.classes import standard_class
     from vdet.detect.onnx.recognition import recognize
     from vdet.detect.onnx.session import Session
 
@@ -133,8 +133,8 @@ def _network(path: Path) -> Facts:
         "kind": "network",
         "form": network.name,
         "input_for_1280x720": f"{network.form.width}x{network.form.height}",
-        "classes": [name for name in network.names if our_name(name)],
-        "other_classes": [name for name in network.names if not our_name(name)],
+        "classes": [name for name in network.names if standard_class(name)],
+        "other_classes": [name for name in network.names if not standard_class(name)],
         "provenance": network.header.provenance if network.header else {},
     }
 

@@ -12,7 +12,7 @@ import click
 
 from vdet.errors import escaped
 from vdet.files import output_errors
-from vdet.progress import Advance, Steps, no_steps
+from vdet.progress import Advance, Progress, no_progress
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -87,14 +87,14 @@ def progress_bar(**options: Any) -> "tqdm[Any]":
 
 
 @contextmanager
-def progress_steps(unit: str) -> Iterator[Steps]:
+def progress_bars(unit: str) -> Iterator[Progress]:
     """Yield a function that ends the bar of the previous step and starts a new one.
 
     It takes the name of the step and its total. A step with a name and no total shows only its
     name, and disappears at its end. See `progress_bar` for when there is no bar.
     """
     if not _shows_bars():
-        yield no_steps  # without tqdm
+        yield no_progress  # without tqdm
         return
     with ExitStack() as stack:
 

@@ -7,7 +7,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_lines, progress_steps
+from vdet.cli.messages import print_lines, progress_bars
 from vdet.run.sinks import Output
 
 
@@ -52,6 +52,6 @@ def review(
         overwrite=overwrite,
         settings_files=(*source.files, tracks),
     )
-    with progress_steps(" frames") as steps:
-        write_saved_review(run, tracks, steps)
+    with progress_bars(" frames") as progress:
+        write_saved_review(run, tracks, progress)
     print_lines(f"{output}: written")

@@ -7,9 +7,9 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_lines, progress_bar, progress_steps
+from vdet.cli.messages import print_lines, progress_bar, progress_bars
 from vdet.cli.options import Paths, SettingsSource
-from vdet.errors import counted, needing
+from vdet.errors import needing, quantity
 from vdet.files import OutputFiles
 from vdet.workers import limit_library_threads
 
@@ -43,8 +43,8 @@ def train(
     from vdet.learn.svm.training import train as fit_model
 
     patches = find_patches(data)
-    with progress_steps("") as steps:
-        model, metrics = fit_model(patches, settings, jobs=jobs, steps=steps)
+    with progress_bars("") as progress:
+        model, metrics = fit_model(patches, settings, jobs=jobs, progress=progress)
     save_model(model, output, overwrite=overwrite)
     print_lines(*metrics.lines(), "", f"{output}: written")
 
@@ -96,13 +96,13 @@ def mine(
         for video, truth in options.with_truths(videos, truths)
     ]
     svm = load_svm(settings.svm, Path(settings.svm.model) if settings.svm.model else None)
-    with progress_steps(" frames") as steps:
+    with progress_bars(" frames") as progress:
         frames, counts = mining.mine(
-            sources, output, settings, svm, overwrite=overwrite, steps=steps
+            sources, output, settings, svm, overwrite=overwrite, progress=progress
         )
     vehicles = f"{counts['vehicle']} patches of vehicles, {counts['box']} more for their boxes"
     alarms = f"{counts['false alarm']} false alarms, {counts['part']} more on parts of vehicles"
-    print_lines(f"{output}: {vehicles}, {alarms}; from {counted(frames, 'frame')}")
+    print_lines(f"{output}: {vehicles}, {alarms}; from {quantity(frames, 'frame')}")
 
 
 @command()

@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Iterable
 from functools import lru_cache
 
-OUR_NAMES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "vehicle")
+STANDARD_CLASSES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "vehicle")
 """The classes in all outputs; `vehicle` is a vehicle of unknown class."""
 
 UNKNOWN = "vehicle"
@@ -19,7 +19,7 @@ WORDS = {
     "person": ("person", "pedestrian", "person sitting"),
     "vehicle": ("vehicle", "other vehicle", "rickshaw", "auto-rickshaw", "tuk-tuk", "tempo"),
 }
-"""Synonyms of `OUR_NAMES` in label files and networks."""
+"""Synonyms of `STANDARD_CLASSES` in label files and networks."""
 
 
 def is_chosen(class_name: str | None, chosen: Collection[str]) -> bool:
@@ -42,11 +42,11 @@ _NAMES = {letters(word): name for name, words in WORDS.items() for word in words
 
 
 @lru_cache(maxsize=1000)
-def our_name(label: str) -> str | None:
-    """Return which of `OUR_NAMES` a label means; None if none."""
+def standard_class(label: str) -> str | None:
+    """Return which of `STANDARD_CLASSES` a label means; None if none."""
     return _NAMES.get(letters(label))
 
 
-def our_names(labels: Iterable[str]) -> tuple[str, ...]:
-    """Return what each label means, once: one of `OUR_NAMES`, or the label in lower case."""
-    return tuple(dict.fromkeys(our_name(label) or label.strip().lower() for label in labels))
+def standard_classes(labels: Iterable[str]) -> tuple[str, ...]:
+    """Return what each label means, once: one of `STANDARD_CLASSES`, or the label in lower case."""
+    return tuple(dict.fromkeys(standard_class(label) or label.strip().lower() for label in labels))

@@ -6,10 +6,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from vdet.config.classes import our_names
+from vdet.config.classes import standard_classes
 from vdet.config.section import FRAME_LENGTH, Pixels, Ratio, Section
 
-ClassNames = Annotated[tuple[str, ...], AfterValidator(our_names)]
+ClassNames = Annotated[tuple[str, ...], AfterValidator(standard_classes)]
 Searches = Annotated[float | None, Field(gt=0, le=1000)]
 
 
@@ -30,7 +30,7 @@ class DetectorSettings(Section):
 
     @property
     def vehicle_classes(self) -> tuple[str, ...]:
-        """The classes that the detector looks for, of `vdet.config.classes.OUR_NAMES`."""
+        """The classes that the detector looks for, of `vdet.config.classes.STANDARD_CLASSES`."""
         return "car", "truck", "bus", "vehicle"
 
     @property

@@ -75,11 +75,11 @@ def load_settings(
     assigned = reduce(_over, single, Document("assignments", {}))
     layers = [*map(_read_layer, paths), _with_sizes(assigned)]
     for layer in layers:
-        if isinstance(model := inside(layer.values, "detector", "model"), str):
+        if isinstance(model := value_at(layer.values, "detector", "model"), str):
             detector = kind_of_model(Path(model)) or detector
     chosen = Document("defaults", {"detector": {"kind": detector}} if detector else {})
     merged = reduce(_with_kinds_over, layers, chosen)
-    kind = inside(merged.values, "detector", "kind") or default_kind("detector")
+    kind = value_at(merged.values, "detector", "kind") or default_kind("detector")
     tracker = tracker_defaults(kind)
     defaults = Document("defaults", {"tracker": tracker} if tracker else {})
     return validated(Settings, _with_kinds_over(defaults, merged))
@@ -123,7 +123,7 @@ def _read_layer(path: Path) -> Document:
 
 def _with_sizes(layer: Document) -> Document:
     """Add to each shape of a layer the size that its points are given for."""
-    size = inside(layer.values, "camera", "size")
+    size = value_at(layer.values, "camera", "size")
     for _, shape in shapes_in(layer.values):
         shape.setdefault("size", list(FRACTIONS) if size is None else size)
     return layer
@@ -142,7 +142,7 @@ _SHAPES: dict[tuple[str, ...], type[Shape]] = {
 def shapes_in(values: dict[str, Any]) -> Iterator[tuple[type[Shape], dict[str, Any]]]:
     """Yield the plain values of each shape in plain settings, with its class."""
     for keys, kind in _SHAPES.items():
-        items = inside(values, *keys)
+        items = value_at(values, *keys)
         for item in items if isinstance(items, list) else [items]:
             if isinstance(item, dict) and (kind is not LaneSettings or "points" in item):
                 yield kind, item
@@ -186,13 +186,13 @@ def _with_kinds_over(below: Document, above: Document) -> Document:
     """Do as `_over`; a section whose kind `above` changes starts from its defaults."""
     values = dict(below.values)
     for name in GROUPS:
-        kind = inside(above.values, name, "kind")
-        if kind is not None and kind != (inside(values, name, "kind") or default_kind(name)):
+        kind = value_at(above.values, name, "kind")
+        if kind is not None and kind != (value_at(values, name, "kind") or default_kind(name)):
             values[name] = {}
     return _over(Document(below.name, values, below.positions), above)
 
 
-def inside(values: Any, *keys: str) -> Any:
+def value_at(values: Any, *keys: str) -> Any:
     """Return the value of a key in nested sections; None where there is none."""
     for key in keys:
         values = values.get(key) if isinstance(values, dict) else None

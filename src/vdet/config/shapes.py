@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from vdet.config.classes import our_name
+from vdet.config.classes import standard_class
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 from vdet.polygons import Point
@@ -211,7 +211,9 @@ class TrafficSettings(Section):
     """Minimum seconds of detections for a vehicle to count."""
     pcu: Annotated[
         dict[Name, Annotated[float, Field(ge=0, le=100)]],
-        AfterValidator(lambda table: {our_name(name) or name: pcu for name, pcu in table.items()}),
+        AfterValidator(
+            lambda table: {standard_class(name) or name: pcu for name, pcu in table.items()}
+        ),
     ] = Field({}, max_length=100)
     """Passenger car units of each class, such as {truck: 2, bus: 2}; other classes have 1. {}: none
     in workbooks.

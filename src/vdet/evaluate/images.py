@@ -16,7 +16,7 @@ from vdet.evaluate.comparison import Comparison, compare_frames, pool
 from vdet.evaluate.scores import DetectionScores, RankedPredictions, rank_predictions, score_boxes
 from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import Label
-from vdet.progress import Steps, no_steps
+from vdet.progress import Progress, no_progress
 from vdet.run.images import ImageSearch
 from vdet.run.threads import SearchThreads
 
@@ -168,7 +168,7 @@ def evaluate_images(
     counting: Counting,
     *,
     threads: int = 1,
-    steps: Steps = no_steps,
+    progress: Progress = no_progress,
 ) -> ImagesResult:
     """Search all images, each on its own, and score each set.
 
@@ -176,7 +176,7 @@ def evaluate_images(
     ----------
     model
         A detector that returns detections of every score, or at least of `counting.score`.
-    steps
+    progress
         Called once, with the number of images, for the progress.
 
     Raises
@@ -184,7 +184,7 @@ def evaluate_images(
     ImageError
         An image cannot be read or searched; the message names it.
     """
-    advance = steps("", sum(len(set_.images) for set_ in sets))
+    advance = progress("", sum(len(set_.images) for set_ in sets))
     whole = ImageSearch(model, Settings())  # the whole image, without steps
 
     def search(labelled: LabelledImage) -> MeasuredImage:

@@ -12,7 +12,7 @@ import numpy as np
 from vdet.boxes import Box, Float64Array, Image
 from vdet.config.schema import InputSettings
 from vdet.draw.boxes import Color
-from vdet.errors import counted, printable
+from vdet.errors import printable, quantity
 from vdet.evaluate.comparison import ComparedFrame, Comparison
 from vdet.evaluate.images import ImagesResult, MeasuredSet
 from vdet.evaluate.output import RunName, figure, table
@@ -48,7 +48,7 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
     for scores, image in scored[:_MAX_IMAGES]:
         if scores.false_positives or scores.misses:
             drawn = _with_boxes(image.labelled.read(), image.shown.frames[0])
-            alarms = counted(scores.false_positives, "false alarm")
+            alarms = quantity(scores.false_positives, "false alarm")
             yield Tile(drawn, image.labelled.path.name, f"{scores.misses} missed, {alarms}")
 
 
@@ -95,7 +95,7 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
         image = images.get(middle.frame.number)
         if image is not None:
             overlap = sum(box.overlap for box in boxes) / len(boxes)
-            caption = f"{counted(len(boxes), 'frame')}, best IoU {overlap:.2f}"
+            caption = f"{quantity(len(boxes), 'frame')}, best IoU {overlap:.2f}"
             tile = _cut_around(middle.box, _with_boxes(image, middle.frame))
             yield Tile(tile, f"{name}, frame {middle.frame.number}", caption)
 

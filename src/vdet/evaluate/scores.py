@@ -14,7 +14,7 @@ from statistics import fmean
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array
-from vdet.config.classes import OUR_NAMES, UNKNOWN
+from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
 from vdet.evaluate.comparison import (
     MATCH_IOU,
     UNMATCHED,
@@ -270,7 +270,9 @@ def class_results(comparison: Comparison) -> tuple[ClassResult, ...]:
         return ()
     pairs = Counter(_pairs(comparison))
     names = set(comparison.vehicle_names) - {UNKNOWN}
-    ordered = [name for name in OUR_NAMES if name in names] + sorted(names - set(OUR_NAMES))
+    ordered = [name for name in STANDARD_CLASSES if name in names] + sorted(
+        names - set(STANDARD_CLASSES)
+    )
     return tuple(_result(name, pairs) for name in ordered)
 
 

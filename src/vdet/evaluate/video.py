@@ -15,7 +15,7 @@ from vdet.findings import warnings_in
 from vdet.labels.label import Label, SavedTracks
 from vdet.labels.reading import read_tracks, read_truth
 from vdet.labels.roles import Roles
-from vdet.progress import Steps, no_steps
+from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
 from vdet.run.loop import Parts
 from vdet.run.video import Run, open_video
@@ -80,7 +80,7 @@ def evaluate_video(
     settings: Settings,
     model: DetectorModel,
     *,
-    steps: Steps = no_steps,
+    progress: Progress = no_progress,
     until: int | None = None,
 ) -> ClipResult:
     """Find the vehicles in a video with `vdet.run.video.open_video`, and score them.
@@ -93,7 +93,7 @@ def evaluate_video(
         Its ground truth; later frames are not read.
     model
         The detector of the settings.
-    steps
+    progress
         Called once, for the progress.
     until
         Number of the last frame to use, from 1; None: the last that the truth covers.
@@ -110,7 +110,7 @@ def evaluate_video(
     labels, frames = list[Label](), 0
     truth = truth.until(until) if until else truth
     with open_video(run, Parts(model), with_traffic=False) as opened:
-        advance, info = steps("", opened.reader.expected), opened.reader.info
+        advance, info = progress("", opened.reader.expected), opened.reader.info
         for result in opened.results:
             number = result.frame.index + 1
             labels += [

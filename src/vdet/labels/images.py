@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, unquote_plus
 
 from vdet.boxes import Image
-from vdet.errors import ImageError, TruthError, counted, printable
+from vdet.errors import ImageError, TruthError, printable, quantity
 from vdet.labels.label import Corners, Label, Size, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import read_image
@@ -115,7 +115,7 @@ def checked_images(
         raise TruthError(f"{name}: has no labelled images")
     if absurd > boxes / 2:
         raise TruthError(
-            f"{name}: {absurd} of {counted(boxes, 'box')} are outside their images or within a "
+            f"{name}: {absurd} of {quantity(boxes, 'box')} are outside their images or within a "
             "pixel; the numbers must be in the unit of the format"
         )
     if 0 < farthest <= _PERCENT < smallest / 2:
@@ -123,7 +123,7 @@ def checked_images(
             "%s: no box reaches beyond pixel 100; if these are percent, convert them", name
         )
     if repeated:
-        duplicates = counted(repeated, "label")
+        duplicates = quantity(repeated, "label")
         _log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
     return LabelledImages(
         name, tuple(checked.values()), dict(omitted.most_common()), dict(ignored.most_common())

@@ -17,7 +17,7 @@ from pydantic import AwareDatetime, Field, TypeAdapter
 
 from vdet.boxes import Box, Float64Array
 from vdet.config.camera import EARLIEST, LATEST
-from vdet.config.classes import our_name
+from vdet.config.classes import standard_class
 from vdet.errors import TruthError
 from vdet.findings import Finding
 from vdet.track.track import FrameTracks, State, Track
@@ -229,7 +229,8 @@ class SavedTracks:
         """Yield the frames with a box and the covered frames, in order.
 
         Boxes are rounded to whole pixels, and scores lie between 0 and 1. A class is one of
-        `OUR_NAMES` if the label means one, else the label. An unknown time is NaN: see `has_times`.
+        `STANDARD_CLASSES` if the label means one, else the label. An unknown time is NaN: see
+        `has_times`.
         """
         frames = self.by_frame()
         for index in sorted(self._indices()):
@@ -239,10 +240,10 @@ class SavedTracks:
     def by_frame(self) -> dict[int, list[Label]]:
         """Return the labels by the number of their frame, from 1, ascending.
 
-        A name is one of `OUR_NAMES` if it means one. The labels of a frame keep their order.
+        A name is one of `STANDARD_CLASSES` if it means one. The labels of a frame keep their order.
         """
         names = {
-            name: name and (our_name(name) or name)
+            name: name and (standard_class(name) or name)
             for name in {label.name for label in self.labels}
         }
         frames: dict[int, list[Label]] = {}

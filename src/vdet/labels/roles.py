@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from vdet.config.classes import OUR_NAMES, letters, our_name
+from vdet.config.classes import STANDARD_CLASSES, letters, standard_class
 from vdet.config.schema import Role, Settings
 
 _IGNORED = ("tram", "train", "misc", "trailer", "caravan", "rider")
@@ -15,7 +15,7 @@ _ANY_KIND = ("car", "truck", "bus")  # included in the class "vehicle" of a dete
 
 def _key(word: str) -> str:
     """Return the class of a word, else its letters."""
-    return our_name(word) or letters(word)
+    return standard_class(word) or letters(word)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Roles:
         Other known classes are ignored. A class in `classes` with the role "other" is also ignored:
         the detector finds it, so it is not background.
         """
-        words: dict[str, Role] = dict.fromkeys((*OUR_NAMES, *map(_key, _IGNORED)), "ignored")
+        words: dict[str, Role] = dict.fromkeys((*STANDARD_CLASSES, *map(_key, _IGNORED)), "ignored")
         words.update(dict.fromkeys(map(_key, classes), "vehicle"))
         for word, role in roles.items():
             is_detected = words.get(_key(word)) == "vehicle"
@@ -74,7 +74,7 @@ class Roles:
 
     def class_of(self, label: str) -> str | None:
         """Return the class of a label; None if it has none."""
-        return self.classes.get(letters(label)) or our_name(label)
+        return self.classes.get(letters(label)) or standard_class(label)
 
 
 DEFAULT_ROLES = Roles.from_settings(Settings())

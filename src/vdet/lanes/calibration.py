@@ -43,7 +43,7 @@ class BoardPhoto:
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class LensCalibration:
     """A camera, and the photographs that it was fitted to."""
 
     camera: LensSettings
@@ -54,7 +54,7 @@ class Calibration:
     """The photographs that were not used, each with the reason."""
 
 
-def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
+def calibrate(paths: Iterable[Path], pattern: Pattern) -> LensCalibration:
     """Find the camera that took these photographs of a flat chessboard.
 
     The frame size is the most frequent size of the photographs. Photographs whose sides differ
@@ -73,7 +73,7 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     size = mode(photo.size for photo in photos) if photos else (0, 0)
     for photo in photos:
         if np.abs(np.subtract(photo.size, size)).max() > SIZE_TOLERANCE:
-            skipped[photo.path] = f"is {_text(photo.size)}, the others are {_text(size)}"
+            skipped[photo.path] = f"is {_size_text(photo.size)}, the others are {_size_text(size)}"
     photos = _without(skipped, photos, pattern)
     camera, errors = _fit(photos, pattern, size)
     median = float(np.median(errors))
@@ -89,7 +89,7 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
             f"angle; take some with the board tilted by {MIN_ANGLE:.0f}° or more, left and "
             "right, up and down"
         )
-    return Calibration(camera, float(np.sqrt(np.mean(np.square(errors)))), used, skipped)
+    return LensCalibration(camera, float(np.sqrt(np.mean(np.square(errors)))), used, skipped)
 
 
 def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
@@ -117,7 +117,7 @@ def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
         return str(error).removeprefix(f"{path}: ")
     corners = find_corners(image, pattern)
     if corners is None:
-        return f"no board of {_text(pattern)} inner corners found"
+        return f"no board of {_size_text(pattern)} inner corners found"
     return BoardPhoto(path, (image.shape[1], image.shape[0]), corners)
 
 
@@ -130,7 +130,7 @@ def _without(
         raise ImageError(
             f"only {len(kept)} of {len(kept) + len(skipped)} photographs can be used, at least "
             f"{MIN_PHOTOS} are needed; take more of the whole board from different angles, or "
-            f"use another --pattern than {_text(pattern)}"
+            f"use another --pattern than {_size_text(pattern)}"
         )
     return kept
 
@@ -165,5 +165,5 @@ def _fit(
     return camera, np.ravel(errors).tolist()
 
 
-def _text(size: Iterable[int]) -> str:
+def _size_text(size: Iterable[int]) -> str:
     return "×".join(map(str, size))

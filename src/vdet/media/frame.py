@@ -232,7 +232,7 @@ class Picture:
         """Return a copy of the pixels that may be changed: see `Planes.copy`."""
         return self.planes.copy(used) if self.planes else self.image.copy()
 
-    def cut(self, box: Box) -> Callable[[], Image]:
+    def deferred_crop(self, box: Box) -> Callable[[], Image]:
         """Copy the part in a box. Return a function that converts it to BGR uint8 `(H, W, 3)`."""
         if not self.planes:
             part = box.cut(self.image).copy()

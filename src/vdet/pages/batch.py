@@ -105,7 +105,7 @@ class ReviewFacts(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class VideoRows:
     """The vehicles of a video.
 
     Attributes
@@ -129,7 +129,7 @@ class Part:
         return [getattr(row, column) and folder + getattr(row, column) for row in self.rows]
 
 
-def table_json(parts: Sequence[Part]) -> str:
+def table_json(parts: Sequence[VideoRows]) -> str:
     """Return the columns of the table for `vehicles.js`.
 
     Empty columns are omitted. `counts` has the number of rows of each video.
@@ -200,7 +200,8 @@ def write_index(videos: Summaries, target: Path) -> None:
     listed = _listed(videos, VideoFacts)
     counts = sum((Counter(video.facts.counts) for video in listed), Counter[str]())
     parts = [
-        Part(video.name, video.address, video.facts.start, video.facts.rows) for video in listed
+        VideoRows(video.name, video.address, video.facts.start, video.facts.rows)
+        for video in listed
     ]
     html = render(
         "index.html", videos=listed, failed=_errors(videos), counts=counts, table=table_json(parts)

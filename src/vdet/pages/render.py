@@ -10,7 +10,7 @@ from urllib.parse import quote
 import cv2
 
 from vdet.boxes import Image
-from vdet.errors import counted, escaped
+from vdet.errors import escaped, quantity
 from vdet.media.images import shrunk
 from vdet.pages.charts import hex_color, time_text
 from vdet.version import __version__
@@ -34,7 +34,7 @@ def render(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"counted": counted, "jpeg": jpeg_uri, "hex": hex_color}
+    environment.filters |= {"quantity": quantity, "jpeg": jpeg_uri, "hex": hex_color}
     environment.filters |= {"clock": time_text, "line": lambda text: escaped(str(text))}
     return environment.get_template(template).render(values, version=__version__)
 

@@ -11,7 +11,7 @@ from zlib import crc32
 
 from markupsafe import Markup
 
-from vdet.config.classes import OUR_NAMES
+from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.shapes import TrafficSettings
 from vdet.findings import Finding
 from vdet.media import VideoInfo
@@ -115,7 +115,7 @@ class Review:
             }
             for mark in self.marks
         ]
-        unlisted = {class_of(mark.event) for mark in self.marks} - set(OUR_NAMES)
+        unlisted = {class_of(mark.event) for mark in self.marks} - set(STANDARD_CLASSES)
         return {
             "video": video.name,
             "size": [video.width, video.height],
@@ -127,7 +127,7 @@ class Review:
             "pictures": [asdict(picture) for picture in self.pictures],
             "marks": marks,
             "traces": [asdict(trace) for trace in self.traces],
-            "classes": [*OUR_NAMES, *sorted(unlisted)],
+            "classes": [*STANDARD_CLASSES, *sorted(unlisted)],
             **self._sampling(),
         }
 

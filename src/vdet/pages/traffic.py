@@ -185,13 +185,13 @@ def scene_picture(
 
 def page_table(table: SheetTable) -> Table:
     """Return a table as text, without the classes that no vehicle has."""
-    rows = [list(map(_text, row)) for row in table.rows]
+    rows = [list(map(_cell_text, row)) for row in table.rows]
     shown = [n for n, cells in enumerate(zip(*rows, strict=True)) if n < 3 or {*cells} - {"", "0"}]
     headings = [table.headings[n] for n in shown] if table.headings else []
     return headings, [[row[n] for n in shown] for row in rows]
 
 
-def _text(cell: Cell) -> str:
+def _cell_text(cell: Cell) -> str:
     match cell:
         case None:
             return ""

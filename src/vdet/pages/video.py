@@ -8,11 +8,11 @@ from itertools import pairwise
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN
 from vdet.draw.boxes import color_of, text_color
-from vdet.errors import named
+from vdet.errors import plural
 from vdet.findings import Finding
 from vdet.media import VideoInfo
 from vdet.pages import charts
-from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
+from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts, VideoRows, table_json
 from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
 from vdet.pages.render import jpeg_uri, render
 from vdet.pages.traffic import page_table, path_marks, scene_picture, with_marks
@@ -185,7 +185,7 @@ class VideoPage:
             color_of=color_of,
             traffic=self._traffic(),
             paths=self._paths(),
-            table=table_json([Part("", page, start, rows)]),
+            table=table_json([VideoRows("", page, start, rows)]),
         )
 
     @property
@@ -220,8 +220,8 @@ class VideoPage:
         driven = self._driven
         classes = Counter(record.class_name for record in driven if record.class_name)
         return [
-            (named(len(driven), "vehicle"), str(len(driven))),
-            *((named(n, name), str(n)) for name, n in classes.most_common(4)),
+            (plural(len(driven), "vehicle"), str(len(driven))),
+            *((plural(n, name), str(n)) for name, n in classes.most_common(4)),
             *((_STOOD[motion], str(n)) for motion, n in stood.items() if motion in _STOOD),
             ("maximum at once", str(self._max_at_once)),
             ("mean seconds in view", f"{shown:.1f}"),

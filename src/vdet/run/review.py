@@ -7,7 +7,7 @@ from vdet.errors import VideoError
 from vdet.files import OutputFiles
 from vdet.findings import Findings
 from vdet.media.reader import VideoReader
-from vdet.progress import Steps
+from vdet.progress import Progress
 from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.scene import saved_frames
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
@@ -16,7 +16,7 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.live import LiveTraffic
 
 
-def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
+def write_saved_review(run: Run, tracks: Path, progress: Progress) -> None:
     """Write the outputs of a run from the file `tracks`, without detecting vehicles.
 
     Raises `VdetError` if the video or the tracks cannot be used, or an output cannot be written.
@@ -33,7 +33,7 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
         frames = {frame.index: frame for frame in scene.frames}
         traffic = LiveTraffic(settings, info.width, info.height)
         context = SinkContext(files, settings, info, is_part=run.is_part, traffic=traffic)
-        advance = steps("", reader.expected)
+        advance = progress("", reader.expected)
         count = 0
         with open_sinks(run.outputs, context) as sinks:
             for frame in reader:

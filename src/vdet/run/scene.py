@@ -15,7 +15,7 @@ from vdet.labels.reading import read_tracks
 from vdet.media import Frame, VideoInfo
 from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
-from vdet.progress import Steps
+from vdet.progress import Progress
 from vdet.regions import Regions
 from vdet.run.result import findings_in
 from vdet.run.steps import tracks_inside
@@ -36,7 +36,7 @@ class SceneTracks:
     findings: tuple[Finding, ...] = ()
 
 
-def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, SceneTracks]:
+def read_scene(run: Run, tracks: Path | None, progress: Progress) -> tuple[Image, SceneTracks]:
     """Return the scene without vehicles, BGR uint8 `(H, W, 3)`, and the tracks of its vehicles.
 
     The image is the median of frames of the video, or the source if that is an image. There is a
@@ -58,7 +58,7 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, Scen
         shown = saved_frames(tracks, run, (width, height)) if tracks else SceneTracks([])
     else:
         images, shown = (
-            _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)
+            _with_saved_tracks(run, tracks, progress) if tracks else _with_detection(run, progress)
         )
         if not images:
             raise VideoError(f"{run.source}: no frames in this part; check --start and --end")
@@ -68,22 +68,24 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, Scen
     return image, shown
 
 
-def _with_saved_tracks(run: Run, tracks: Path, steps: Steps) -> tuple[list[Image], SceneTracks]:
+def _with_saved_tracks(
+    run: Run, tracks: Path, progress: Progress
+) -> tuple[list[Image], SceneTracks]:
     """Return some of the first images, and all saved tracks."""
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
     ) as reader:
         size = reader.info.width, reader.info.height
         saved = saved_frames(tracks, run, size, reader.info)
-        steps("reading the scene", None)
+        progress("reading the scene", None)
         return _spread(reader), saved
 
 
-def _with_detection(run: Run, steps: Steps) -> tuple[list[Image], SceneTracks]:
+def _with_detection(run: Run, progress: Progress) -> tuple[list[Image], SceneTracks]:
     """Return some of the images, and the tracks of all frames."""
     shown: list[FrameTracks] = []
     with open_video(run, with_traffic=False) as video:
-        advance = steps("", video.reader.expected)
+        advance = progress("", video.reader.expected)
 
         def frames() -> Iterator[Frame]:
             for result in video.results:

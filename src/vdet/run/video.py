@@ -17,7 +17,7 @@ from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import FileIds, OutputFiles, valid_text
 from vdet.findings import Finding
 from vdet.media.reader import VideoReader
-from vdet.progress import Steps, no_steps
+from vdet.progress import Progress, no_progress
 from vdet.run.inputs import input_files
 from vdet.run.loop import Parts, build, named_errors, peek
 from vdet.run.result import FINDINGS, Fact, Facts, FrameResult, findings_in
@@ -237,7 +237,7 @@ class Results(Iterator[FrameResult]):
 
 
 def run_video(
-    run: Run, parts: Parts | None = None, *, steps: Steps = no_steps, is_last: bool = False
+    run: Run, parts: Parts | None = None, *, progress: Progress = no_progress, is_last: bool = False
 ) -> RunTotals:
     """Process a run. Its outputs appear together, at the end of the run.
 
@@ -247,7 +247,7 @@ def run_video(
     ----------
     parts
         The detector, the tracker and further steps; None: as the settings say.
-    steps
+    progress
         Called once, with the expected number of frames, for the progress.
     is_last
         As for `vdet.files.OutputFiles`.
@@ -265,11 +265,11 @@ def run_video(
     files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs, is_last=is_last)
     check_sinks(run.outputs, files)
     with files:
-        return write_outputs(run, files, parts, steps=steps)
+        return write_outputs(run, files, parts, progress=progress)
 
 
 def write_outputs(
-    run: Run, files: OutputFiles, parts: Parts | None, *, steps: Steps = no_steps
+    run: Run, files: OutputFiles, parts: Parts | None, *, progress: Progress = no_progress
 ) -> RunTotals:
     """Do as `run_video`, but leave the complete outputs in `files`, under temporary names.
 
@@ -294,7 +294,7 @@ def write_outputs(
             stage_images=stage_images_of(video.detector),
         )
         with open_sinks(run.outputs, context) as sinks:
-            advance = steps("", video.reader.expected)
+            advance = progress("", video.reader.expected)
             for result in video.results:
                 sinks.write(result)
                 ids.update(track.id for track in result.tracks)

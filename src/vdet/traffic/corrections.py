@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar
 import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
-from vdet.config.classes import UNKNOWN, is_chosen, our_name
+from vdet.config.classes import UNKNOWN, is_chosen, standard_class
 from vdet.config.document import read_document
 from vdet.config.loading import validated
 from vdet.config.section import Section
@@ -89,7 +89,7 @@ class ReviewedEvent(Section):
     def true_class(self) -> str:
         """The class of the vehicle that passed; ours for a synonym."""
         label = self._correct.get("class", self.class_name)
-        return our_name(label) or label
+        return standard_class(label) or label
 
     @property
     def is_missed(self) -> bool:

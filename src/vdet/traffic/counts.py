@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from vdet.config.classes import UNKNOWN
-from vdet.errors import ArgumentError, counted, needing
+from vdet.errors import ArgumentError, needing, quantity
 from vdet.findings import Finding, warnings_in
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
@@ -204,8 +204,8 @@ class Corrected:
     estimates: tuple[Estimate, ...] = ()
 
     def __str__(self) -> str:
-        corrected = f"corrected: {counted(self.events, 'event')}, by {', '.join(self.files)}"
-        return f"{corrected}; {self.checked} of {counted(self.minutes, 'minute')} checked"
+        corrected = f"corrected: {quantity(self.events, 'event')}, by {', '.join(self.files)}"
+        return f"{corrected}; {self.checked} of {quantity(self.minutes, 'minute')} checked"
 
 
 @dataclass(frozen=True, slots=True)

@@ -323,7 +323,7 @@ class BestCrops:
             merit = _merit(track, picture)
             if merit and merit > self._merits.get(track.id, (False, 0.0)):
                 self._merits[track.id] = merit
-                part = picture.cut(_padded(track.box.rounded))
+                part = picture.deferred_crop(_padded(track.box.rounded))
                 self._best[track.id] = partial(self._crop, track, frame.time, part)
         return gone
 

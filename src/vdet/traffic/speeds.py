@@ -22,7 +22,7 @@ from statistics import median
 
 import numpy as np
 
-from vdet.boxes import EDGE, Float64Array
+from vdet.boxes import Float64Array
 from vdet.findings import Finding
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks

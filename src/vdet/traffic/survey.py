@@ -12,7 +12,7 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.config.shapes import NOWHERE
-from vdet.errors import ConfigError, counted
+from vdet.errors import ConfigError, quantity
 from vdet.traffic import counts as tables
 from vdet.traffic import measures
 from vdet.traffic.clock import SEAM, ClockTime, Interval, Intervals
@@ -108,11 +108,11 @@ class Survey:
     def facts(self) -> SheetTable:
         """Return what the survey is, when and how it was made, and whether it is in doubt."""
         survey, whole = self.settings.survey, self._whole
-        files = counted(len(self.videos), "file")
+        files = quantity(len(self.videos), "file")
         checked = sum(counts.corrected is not None for counts in self.counts)
         doubts = list(dict.fromkeys(text for counts in self.counts for text in counts.warnings))
         if more := len(doubts[_MOST:]):
-            doubts[_MOST:] = [f"and {counted(more, 'other')}, see Notes"]
+            doubts[_MOST:] = [f"and {quantity(more, 'other')}, see Notes"]
         clocks = dict.fromkeys(counts.clock.source for counts in self.counts if counts.clock)
         times = (time for time in (whole.start, whole.end) if isinstance(time, datetime))
         zones = dict.fromkeys(f"UTC{time.isoformat()[-6:]}" for time in times)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
-from vdet.errors import clock_text, counted
+from vdet.errors import clock_text, quantity
 from vdet.findings import Finding
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
@@ -216,7 +216,7 @@ def trace_findings(counts: Counts) -> tuple[Finding, ...]:
         starts = Counter(int(time // _INTERVAL) * _INTERVAL for time in times)
         [(start, most)] = starts.most_common(1)
         text = (
-            f"{name}: {counted(number, 'trace')} without a vehicle, and {vehicles[name]} counted; "
+            f"{name}: {quantity(number, 'trace')} without a vehicle, and {vehicles[name]} counted; "
             f"{clock_text(start)} to {clock_text(start + _INTERVAL)}: {most}"
         )
         fraction = number / max(1, vehicles[name])

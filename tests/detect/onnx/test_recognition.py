@@ -15,7 +15,7 @@ from detect.onnx.graphs import Form, RedBox, final, ultralytics, write_graph, wr
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import NetworkModel
-from vdet.detect.onnx.recognition import COCO, cell_centers, our_cells, recognize
+from vdet.detect.onnx.recognition import COCO, cell_centers, recognize, vdet_cells
 from vdet.detect.onnx.session import Session
 from vdet.errors import ModelError
 from vdet.media import Picture
@@ -208,7 +208,7 @@ def test_the_score_of_a_box_is_calibrated_by_the_class_it_is_named() -> None:
     table = np.zeros((1, 21, 7), np.float32)  # 16 + 4 + 1 cells of two classes
     table[..., 0], table[0, 3, 6] = 0.5, 1.0
     calibration = np.array([[1, 0], [2, -3]], np.float32)
-    found = our_cells(table, 0.01, cells=cell_centers(32, 32), calibration=calibration)
+    found = vdet_cells(table, 0.01, cells=cell_centers(32, 32), calibration=calibration)
     assert found.classes.tolist() == [0, 0, 0, 1, *[0] * 17]
     expected = [1 / (1 + math.exp(-(1 * 0.5 + 0))), 1 / (1 + math.exp(-(2 * 0.5 - 3)))]
     assert found.scores[[0, 3]].tolist() == pytest.approx(expected, abs=1e-6)

@@ -9,7 +9,7 @@ from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.detector import SvmModel, Trace
+from vdet.detect.svm.detector import SearchTrace, SvmModel
 from vdet.media import Picture
 
 MODEL = red_finder()
@@ -33,8 +33,8 @@ def detect_still(image: Image, settings: SvmSettings = ROWS) -> Boxes:
     return detector.detect(detector.search(Picture(image), None))
 
 
-def trace_of(detections: Boxes) -> Trace:
-    assert isinstance(detections.trace, Trace)
+def trace_of(detections: Boxes) -> SearchTrace:
+    assert isinstance(detections.trace, SearchTrace)
     return detections.trace
 
 

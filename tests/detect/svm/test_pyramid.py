@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import resize, split
 from vdet.detect.svm.search import FramePyramid
-from vdet.detect.svm.windows import Strip
+from vdet.detect.svm.windows import FrameStrip
 from vdet.media import Picture
 
 FEATURES = FeatureSettings(halved=())
@@ -28,7 +28,7 @@ def test_a_cut_of_halvable_size_is_halved_from_odd_and_even_pixels(
 ) -> None:
     rows = slice(top, top + factor * side * 2)
     columns = slice(left, left + factor * side * 3)
-    cut = FramePyramid(Picture(FRAME), FEATURES).cut(Strip(rows, columns, side * 3, side * 2))
+    cut = FramePyramid(Picture(FRAME), FEATURES).cut(FrameStrip(rows, columns, side * 3, side * 2))
     means = FRAME[rows, columns].reshape(side * 2, factor, side * 3, factor, 3).mean(axis=(1, 3))
     expected = np.array(split(means.round().astype(np.uint8), FEATURES), int)
     np.testing.assert_allclose(cut, expected, atol=2 + np.log2(factor) / 2)  # each halving rounds
@@ -46,8 +46,8 @@ def test_beyond_the_sides_the_outermost_columns_repeat(
     expected = BEYOND[rows, columns]
     of_frame = slice(columns.start - MARGIN, columns.stop - MARGIN)
     height, width, _ = expected.shape
-    window = frame.cut(Strip(rows, of_frame, width, height))
+    window = frame.cut(FrameStrip(rows, of_frame, width, height))
     np.testing.assert_array_equal(window, split(expected, FEATURES))
-    cut = frame.cut(Strip(rows, of_frame, side, side))
+    cut = frame.cut(FrameStrip(rows, of_frame, side, side))
     as_in_training = split(resize(expected, side, side), FEATURES)
     np.testing.assert_array_equal(cut, as_in_training)

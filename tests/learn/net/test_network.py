@@ -31,7 +31,7 @@ from vdet.learn.net.network import (  # noqa: E402
     paired_iou,
     uncounted,
 )
-from vdet.learn.net.sources import UNKNOWN, NetSample, NetSource  # noqa: E402
+from vdet.learn.net.sources import UNLABELLED, NetSample, NetSource  # noqa: E402
 from vdet.learn.net.training import train_network  # noqa: E402
 from vdet.media import Picture  # noqa: E402
 from vdet.testing import check_detector  # noqa: E402
@@ -159,7 +159,7 @@ def test_what_looks_like_a_class_without_labels_is_no_background() -> None:
     centers = torch.from_numpy(cell_centers(64, 32)[0])
     everywhere, left = [0.0, 0, 64, 32], [0.0, 0, 32, 32]
     regions = Vehicles(
-        torch.tensor([0, 1]), torch.tensor([everywhere, left]), torch.tensor([2, UNKNOWN])
+        torch.tensor([0, 1]), torch.tensor([everywhere, left]), torch.tensor([2, UNLABELLED])
     )
     seen = torch.zeros(2, len(centers), dtype=torch.long)
     seen[0, 3] = 2
@@ -170,7 +170,7 @@ def test_what_looks_like_a_class_without_labels_is_no_background() -> None:
 
 
 def test_rare_classes_weigh_more_and_unknown_kinds_as_much_as_the_most_frequent() -> None:
-    classes = np.array([0] * 16 + [1] * 4 + [UNKNOWN] * 2)
+    classes = np.array([0] * 16 + [1] * 4 + [UNLABELLED] * 2)
     boxes = np.array([[0, 0, 9, 9]] * len(classes), np.float32)
     sample = NetSample(np.zeros((9, 9, 3), np.uint8), boxes, classes, np.zeros(22, np.bool_))
     weights = class_weights([NetSource("all", [sample])], 3)

@@ -12,13 +12,13 @@ torch = pytest.importorskip(
 
 from benchmarks.ship import ship  # noqa: E402
 
-from vdet.detect.onnx.recognition import Calibration, Header  # noqa: E402
+from vdet.detect.onnx.recognition import Header, ScoreCalibration  # noqa: E402
 from vdet.detect.onnx.session import Session  # noqa: E402
 from vdet.learn.net.export import export_network  # noqa: E402
 from vdet.learn.net.network import Network  # noqa: E402
 
 OLD, NEW = ("car", "truck"), ("car", "truck", "other vehicle")
-STEEP = Calibration(slope=2.0, offset=0.5)
+STEEP = ScoreCalibration(slope=2.0, offset=0.5)
 IMAGE = np.random.default_rng(1).integers(0, 256, (1, 64, 96, 3), np.uint8)
 
 
@@ -66,5 +66,5 @@ def test_a_synonym_is_calibrated_by_the_results_of_our_class(networks: tuple[Pat
     results = new.with_name("results.json")
     results.write_text(json.dumps({str(new): found}), encoding="utf-8")
     header = ship(new, results, new.with_name("shipped.onnx"))
-    assert header.by_class == {"other vehicle": Calibration(slope=3.0, offset=1.0)}
-    assert header.calibration == Calibration(slope=1.0, offset=0.0)
+    assert header.by_class == {"other vehicle": ScoreCalibration(slope=3.0, offset=1.0)}
+    assert header.calibration == ScoreCalibration(slope=1.0, offset=0.0)

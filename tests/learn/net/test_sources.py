@@ -11,7 +11,7 @@ from vdet.config.schema import InputSettings, Settings
 from vdet.errors import VideoError
 from vdet.labels.reading import read_labelled_images
 from vdet.labels.roles import Roles
-from vdet.learn.net.sources import UNKNOWN, clip_source, image_source
+from vdet.learn.net.sources import UNLABELLED, clip_source, image_source
 
 
 def test_a_damaged_video_is_learnt_from_as_far_as_the_settings_tolerate(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_vehicles_of_a_labelled_video_keep_their_classes(tmp_path: Path) -> None
     (sample,) = source.samples
     classes = settings.train.net.classes
     truck, car = classes.index("truck"), classes.index("car")
-    assert sample.classes.tolist() == [truck, UNKNOWN, car, UNKNOWN]
+    assert sample.classes.tolist() == [truck, UNLABELLED, car, UNLABELLED]
     assert source.ignored == {"vehicle": 1}
 
 
@@ -58,5 +58,5 @@ def test_a_class_without_labels_makes_the_picture_an_ignore_region_for_it(tmp_pa
     (sample,) = source.samples
     person = settings.train.net.classes.index("person")
     assert sample.boxes.tolist() == [[20, 30, 80, 70], [0, 0, 9, 9], [0, 0, 160, 96]]
-    assert sample.classes.tolist() == [0, UNKNOWN, person]
+    assert sample.classes.tolist() == [0, UNLABELLED, person]
     assert sample.ignored.tolist() == [False, True, True]

@@ -10,7 +10,7 @@ import pytest
 
 from vdet.boxes import Image
 from vdet.errors import DataError
-from vdet.learn.svm.dataset import UNKNOWN, Sides, find_patches, patch_archive, read_patches
+from vdet.learn.svm.dataset import NO_SIDES, Sides, find_patches, patch_archive, read_patches
 
 PATCH = np.random.default_rng(0).integers(0, 256, (8, 8, 3), dtype=np.uint8)
 PNG = cv2.imencode(".png", PATCH)[1].tobytes()
@@ -120,7 +120,7 @@ def test_a_table_has_the_sides_of_the_vehicle_in_a_patch(tmp_path: Path, make: M
     files = find_patches([source])
     assert [(file.name, file.vehicle, file.is_boxed, file.sides) for file in files] == [
         ("boxes/far/1.png", True, True, pytest.approx((-0.75, -0.25, math.nan, 0.5), nan_ok=True)),
-        ("boxes/far/2.png", True, True, pytest.approx(UNKNOWN, nan_ok=True)),
+        ("boxes/far/2.png", True, True, pytest.approx(NO_SIDES, nan_ok=True)),
         ("non-vehicles/road/1.png", False, False, None),
         ("vehicles/far/1.png", True, False, (-0.5, -0.25, 0.5, 0.25)),
     ]

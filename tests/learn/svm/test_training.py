@@ -177,7 +177,7 @@ def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(
         steps.append((what, total))
         return lambda _: None
 
-    found = train(find_patches([copy]), SETTINGS, steps=start)[1].test
+    found = train(find_patches([copy]), SETTINGS, progress=start)[1].test
     assert (found.patches, found.accuracy) == (2 + 4 + 3 + 2, 10 / 11)
     assert found.groups["non-vehicles/sky"] == 0.5
     assert steps[:2] == [("describing patches", 57), ("fitting the classifier", None)]

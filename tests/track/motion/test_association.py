@@ -7,7 +7,7 @@ from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.track.motion.association import take_over_ids, without_duplicates
 from vdet.track.motion.state import whole_box
-from vdet.track.motion.vehicle import Observation, SearchedFrame, Vehicle
+from vdet.track.motion.vehicle import FrameStep, Observation, TrackedVehicle
 
 SIZE = (1000, 500)
 BOX = np.array([400.0, 200.0, 500.0, 260.0])
@@ -20,9 +20,9 @@ def vehicle(
     score: float = 1.0,
     confirmed: bool = True,
     unseen: float = 0,
-) -> Vehicle:
-    made = Vehicle(
-        Observation(box, score), SearchedFrame(-unseen, 0.04, SIZE), MotionTrackerSettings()
+) -> TrackedVehicle:
+    made = TrackedVehicle(
+        Observation(box, score), FrameStep(-unseen, 0.04, SIZE), MotionTrackerSettings()
     )
     made.confirmed, made.id, made.unseen = confirmed, number, unseen
     return made
@@ -37,7 +37,7 @@ def test_one_of_which_only_a_part_was_seen_first_is_found_where_it_is_now() -> N
     take_over_ids([lost, new])
     assert new.id is None
     new.predict(0.04)
-    new.see(Observation(BOX, 1.0), SearchedFrame(0.04, 0.04, SIZE))
+    new.see(Observation(BOX, 1.0), FrameStep(0.04, 0.04, SIZE))
     take_over_ids([lost, new])
     assert new.id == 7
 
@@ -52,7 +52,7 @@ def test_one_of_which_only_a_part_was_seen_first_is_found_where_it_is_now() -> N
     ],
     ids=["too far", "too large", "unconfirmed", "not seen"],
 )
-def test_others_do_not(new: Vehicle) -> None:
+def test_others_do_not(new: TrackedVehicle) -> None:
     lost = vehicle(number=7, unseen=1.2)
     assert take_over_ids([lost, new]) == [lost, new]
     assert new.id is None
@@ -65,11 +65,11 @@ def test_of_two_lost_vehicles_the_nearest_is_taken_and_only_by_one() -> None:
     assert [item.id for item in new] == [8, 7]
 
 
-def boxes_of(*vehicles: Vehicle) -> Float64Array:
+def boxes_of(*vehicles: TrackedVehicle) -> Float64Array:
     return whole_box(np.array([vehicle.state.mean[:, 0] for vehicle in vehicles]))
 
 
-def without(*vehicles: Vehicle) -> list[Vehicle]:
+def without(*vehicles: TrackedVehicle) -> list[TrackedVehicle]:
     return without_duplicates(vehicles, boxes_of(*vehicles))
 
 

@@ -45,7 +45,7 @@ def test_a_lost_vehicle_keeps_its_id_for_the_same_time(rate: int) -> None:
         assert ids(shown[-1:]) == {id_}
 
 
-# Steps
+# Progress
 
 
 def test_frames_may_come_at_any_times() -> None:

@@ -20,7 +20,7 @@ from vdet.boxes import (
     clipped,
     iou_matrix,
 )
-from vdet.config.classes import our_name
+from vdet.config.classes import standard_class
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.recognition import Recognized, recognize
 from vdet.detect.onnx.session import Session
@@ -256,7 +256,7 @@ def combined_classes(settings: NetworkSettings) -> tuple[str, ...]:
 def our_classes(names: Sequence[str], chosen: Sequence[str]) -> list[int]:
     """Return the index in `chosen` of each class of a network, -1 if it is missing."""
     numbers = {name: number for number, name in enumerate(chosen)}
-    return [numbers.get(our_name(name) or name.strip().lower(), -1) for name in names]
+    return [numbers.get(standard_class(name) or name.strip().lower(), -1) for name in names]
 
 
 def shipped_network(_: NetworkSettings) -> Path:

@@ -31,7 +31,7 @@ HEADER_KEY = "vdet"
 """Metadata key of the header."""
 
 
-class Calibration(Section):
+class ScoreCalibration(Section):
     """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
 
     It is the fraction of boxes with this output that show a vehicle, fitted on held-out cameras
@@ -49,8 +49,8 @@ class Header(Section):
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
     pixels: int = Field(147_456, ge=1024, le=16_000_000)
     """Pixels of the scaled video frame."""
-    calibration: Calibration = Calibration()
-    by_class: dict[str, Calibration] = Field({}, max_length=1000)
+    calibration: ScoreCalibration = ScoreCalibration()
+    by_class: dict[str, ScoreCalibration] = Field({}, max_length=1000)
     """The calibration of boxes by class; `calibration` for other classes."""
     provenance: dict[str, Any] = Field({})
     """Training data, training settings and metrics."""
@@ -91,7 +91,7 @@ OutputLayout = Callable[[Array, float], RawBoxes]
 """Converts an output to boxes in pixels of the input; drops scores below a minimum, not a NaN."""
 
 
-def our_cells(
+def vdet_cells(
     output: Array, minimum: float, *, cells: Cells, calibration: Float32Array
 ) -> RawBoxes:
     """Read our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.network`.
@@ -276,7 +276,7 @@ class Recognized:
         if self.header is None:
             return self
         size = size_of_area(width, height, self.header.pixels * scale)
-        return _ours(self.session, self.header, size)
+        return _of_vdet(self.session, self.header, size)
 
     def find(self, picture: Picture, minimum: float) -> RawBoxes:
         """Return the boxes in pixels of the picture, with scores of at least `minimum`.
@@ -325,7 +325,7 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
     header = read_header(session)
     if header is None:
         return _foreign(session, tuple(names))
-    return _ours(session, header, size_of_area(1, 1, header.pixels))
+    return _of_vdet(session, header, size_of_area(1, 1, header.pixels))
 
 
 def read_header(session: Session) -> Header | None:
@@ -338,12 +338,12 @@ def read_header(session: Session) -> Header | None:
         raise ModelError(f"{session.path}: its header is damaged or from a newer vdet") from error
 
 
-def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized:
+def _of_vdet(session: Session, header: Header, size: tuple[int, int]) -> Recognized:
     """Return our network with an input of one size, width and height in pixels."""
     scores = [header.by_class.get(name, header.calibration) for name in header.classes]
     lines = np.array([(score.slope, score.offset) for score in scores], np.float32)
     width, height = size
-    layout = partial(our_cells, cells=cell_centers(width, height), calibration=lines)
+    layout = partial(vdet_cells, cells=cell_centers(width, height), calibration=lines)
     form = InputForm(width, height)
     return Recognized(session, "vdet", header.classes, form, layout, header)
 

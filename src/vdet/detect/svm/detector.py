@@ -28,7 +28,7 @@ Candidates = tuple[Windows, bool]
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
+class SearchTrace:
     """Data for the stage images of a frame.
 
     `hits` are the windows with at least `detector.search.probability`, `heat` is the heatmap of the
@@ -150,7 +150,7 @@ class SvmDetector:
                 "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
                 "strength": [region.strength for region in regions],
             },
-            trace=Trace(hits, heat),
+            trace=SearchTrace(hits, heat),
         )
         return self._shown_in_still(boxes) if is_still else boxes
 

@@ -216,7 +216,7 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) ->
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Vehicle:
+class _AgreedBox:
     """A box `(4,)` that votes agree on, and their weights of position and presence."""
 
     sides: Float64Array
@@ -238,7 +238,7 @@ def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
     return groups
 
 
-def _vehicles(votes: Votes, minimum: float) -> Iterator[_Vehicle]:
+def _vehicles(votes: Votes, minimum: float) -> Iterator[_AgreedBox]:
     """Yield the vehicles that votes agree on, the one with most agreement first."""
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
@@ -253,7 +253,7 @@ def _vehicles(votes: Votes, minimum: float) -> Iterator[_Vehicle]:
         used = np.maximum(around, overlaps[mode]) > _AGREEMENT
         used[mode] = True
         if weight >= minimum:
-            yield _Vehicle(box, float(agreed[mode]), weight)
+            yield _AgreedBox(box, float(agreed[mode]), weight)
             used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > _INSIDE
         presence[used] = position[used] = 0
 

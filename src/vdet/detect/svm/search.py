@@ -17,7 +17,7 @@ from vdet.boxes import Float32Array, Image
 from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import Channels, halve, hog_descriptors, resize, split
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.windows import WINDOW_SIDES, IndexArray, Strip, WindowGrid
+from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, IndexArray, WindowGrid
 from vdet.media import Picture
 
 
@@ -53,7 +53,7 @@ class FramePyramid:
         rows = slice(top, picture.height if bottom is None else bottom)
         self._levels = _levels(picture, rows, margin)
 
-    def cut(self, strip: Strip) -> Channels:
+    def cut(self, strip: FrameStrip) -> Channels:
         """Return a strip of the frame, resized.
 
         Each channel, or BGR, equals `resize(channel[rows, columns], width, height)`. Halvings are
@@ -142,7 +142,7 @@ BATCH = 8192
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Part:
+class _StripWindows:
     """`n` windows of a grid that lie at whole pixels of one strip.
 
     `numbers` `(n,)` are those in the grid; `x` and `y`, `(n,)` each, are the top-left pixels of the
@@ -150,7 +150,7 @@ class _Part:
     """
 
     numbers: IndexArray
-    strip: Strip
+    strip: FrameStrip
     x: IndexArray
     y: IndexArray
 
@@ -201,12 +201,12 @@ class DenseSearch:
         return probabilities, sides
 
 
-def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
+def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _StripWindows:
     """Return every n-th window, from this column and row on."""
     numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)[row::n, column::n]
     pixels = int(n * grid.step * patch / grid.size)
     y, x = np.indices(numbers.shape).reshape(2, -1) * pixels
-    return _Part(numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y)
+    return _StripWindows(numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y)
 
 
 class Blocks:

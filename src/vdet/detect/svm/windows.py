@@ -72,7 +72,7 @@ class Windows:
 
 
 @dataclass(frozen=True, slots=True)
-class Strip:
+class FrameStrip:
     """A part of a frame, `rows` and `columns`, and its size after resizing, pixels.
 
     Columns may be outside the frame.
@@ -116,7 +116,7 @@ class WindowGrid:
         along = max(1.0, float(self.size / self.step))
         return 1 / (min(self.columns, along) * min(self.rows, along))
 
-    def strip(self, patch: int) -> Strip:
+    def strip(self, patch: int) -> FrameStrip:
         """Return the strip from the first window to the last, with windows of `patch` pixels."""
 
         def extent(first: Fraction, count: int) -> tuple[slice, int]:
@@ -125,7 +125,7 @@ class WindowGrid:
 
         rows, height = extent(self.top, self.rows)
         columns, width = extent(self.left, self.columns)
-        return Strip(rows, columns, width, height)
+        return FrameStrip(rows, columns, width, height)
 
     def every_nth(self, n: int, column: int, row: int) -> "WindowGrid":
         """Return the grid of every n-th window, from this column and row on."""

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from vdet.detect.onnx.recognition import STRIDES, cell_centers
-from vdet.learn.net.sources import UNKNOWN, NetSource
+from vdet.learn.net.sources import UNLABELLED, NetSource
 
 STEM = 16
 TRUNK = ((32, 0), (64, 2), (160, 3), (256, 2))
@@ -229,7 +229,7 @@ def loss_of(network: Network, batch: Batch, weights: Tensor) -> Tensor:
     score_loss = (focal * distance.square() * counted).sum()
     box_loss = ((1 - giou(boxes[cells], batch.vehicles.boxes[row])) * iou).sum()
     class_loss = functional.cross_entropy(
-        raw[..., 5:][cells], classes, weights[:-1], ignore_index=UNKNOWN, reduction="sum"
+        raw[..., 5:][cells], classes, weights[:-1], ignore_index=UNLABELLED, reduction="sum"
     )
     of_places = (score_loss + _BOX_WEIGHT * box_loss) / iou.sum().clamp(min=1)
     return of_places + _CLASS_WEIGHT * class_loss / max(len(iou), 1)
@@ -298,7 +298,7 @@ def uncounted(ignored: Vehicles, centers: Tensor, seen: Tensor) -> tuple[Tensor,
     boxes = ignored.boxes[:, None]
     inside = ((centers > boxes[..., :2]) & (centers < boxes[..., 2:])).all(-1)
     classes = ignored.classes[:, None]
-    inside &= (classes == UNKNOWN) | (classes == seen[ignored.image])
+    inside &= (classes == UNLABELLED) | (classes == seen[ignored.image])
     row, cell = torch.nonzero(inside, as_tuple=True)
     return ignored.image[row], cell
 

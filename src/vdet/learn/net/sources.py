@@ -11,7 +11,7 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
-from vdet.errors import counted, printable
+from vdet.errors import printable, quantity
 from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import Label
 from vdet.labels.reading import read_truth
@@ -21,7 +21,7 @@ from vdet.media.reader import VideoReader
 MAX_PIXELS = 640_000
 """Images are held with at most this many pixels; larger ones are scaled down."""
 
-UNKNOWN = -1
+UNLABELLED = -1
 """The class of a vehicle whose kind is not known, and of an ignore region for all classes."""
 
 EVERY = 4
@@ -39,7 +39,7 @@ class NetSample:
     boxes
         float32 `(n, 4)`: x1, y1, x2, y2, pixels of `image`.
     classes
-        int64 `(n,)`: indices in `train.net.classes`; `UNKNOWN` for a vehicle whose kind is not
+        int64 `(n,)`: indices in `train.net.classes`; `UNLABELLED` for a vehicle whose kind is not
         known.
     ignored
         bool `(n,)`: the box is an ignore region, neither vehicle nor background. With a class, it
@@ -68,7 +68,7 @@ class NetSample:
 
     def ignoring(self, rows: BoolArray) -> "NetSample":
         """Return the sample with further boxes as ignore regions for all classes."""
-        classes = np.where(rows & ~self.ignored, UNKNOWN, self.classes)
+        classes = np.where(rows & ~self.ignored, UNLABELLED, self.classes)
         return replace(self, classes=classes, ignored=self.ignored | rows)
 
 
@@ -124,7 +124,7 @@ class NetSource:
     def lines(self) -> Iterator[str]:
         """Yield as lines of text what is learnt, and which labels are not known."""
         learnt = _listed(self.vehicles) or "nothing to learn"
-        yield f"{self.name}: {counted(len(self.samples), 'image')}; {learnt}"
+        yield f"{self.name}: {quantity(len(self.samples), 'image')}; {learnt}"
         if self.background:
             yield f"  background, as their label is unknown: {_listed(self.background)}"
 
@@ -204,7 +204,7 @@ def _sample(image: Image, labelled: LabelledImage, classes: Sequence[str]) -> Ne
     height, width = image.shape[:2]
     number = {name: index for index, name in enumerate(classes)}
     unlabelled = [number[name] for name in labelled.unlabelled if name in number]
-    named = [number.get(label.name or "", UNKNOWN) for label in labelled.labels]
+    named = [number.get(label.name or "", UNLABELLED) for label in labelled.labels]
     boxes = [*(label.box for label in labelled.labels), *[(0, 0, width, height)] * len(unlabelled)]
     is_whole = np.repeat([False, True], [len(named), len(unlabelled)])
     sample = NetSample(

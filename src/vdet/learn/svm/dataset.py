@@ -36,7 +36,7 @@ Sides = tuple[float, float, float, float]
 Right and down are positive; NaN for an unknown side, for example outside the frame.
 """
 
-UNKNOWN: Sides = (math.nan, math.nan, math.nan, math.nan)
+NO_SIDES: Sides = (math.nan, math.nan, math.nan, math.nan)
 """No side is known."""
 
 

@@ -12,7 +12,7 @@ from vdet.boxes import BoolArray, Float32Array, Image
 from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import FeatureExtractor, resize
 from vdet.errors import DataError
-from vdet.learn.svm.dataset import UNKNOWN, PatchFile, read_patches
+from vdet.learn.svm.dataset import NO_SIDES, PatchFile, read_patches
 from vdet.workers import core_count
 
 TEST_FRACTION = 0.2
@@ -107,7 +107,7 @@ def extract(
         for file, image in zip(files, read_patches(files), strict=True):
             if image is None:
                 raise DataError(f"{file}: is not a readable image")
-            whole = PatchSample(image, file.vehicle, np.array(file.sides or UNKNOWN, np.float32))
+            whole = PatchSample(image, file.vehicle, np.array(file.sides or NO_SIDES, np.float32))
             rng = np.random.default_rng(zlib.crc32(image.tobytes()))
             yield [whole, *(augment(whole, rng) if augmented else ())]
 

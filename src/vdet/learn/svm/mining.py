@@ -30,7 +30,7 @@ from vdet.labels.roles import Roles
 from vdet.learn.svm.dataset import Sides, patch_archive
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
-from vdet.progress import Steps, no_steps
+from vdet.progress import Progress, no_progress
 from vdet.run.loop import named_errors, peek
 
 PatchKind = Literal["vehicle", "box", "false alarm", "part"]
@@ -227,11 +227,11 @@ class VideoSource:
     last: int | None = None
 
     def choose(
-        self, model: SvmModel, settings: Settings, limits: MiningLimits, steps: Steps
+        self, model: SvmModel, settings: Settings, limits: MiningLimits, progress: Progress
     ) -> Iterator[tuple[Frame, list[ChosenWindow]]]:
         """Yield the frames to use, with the windows that become patches.
 
-        `steps` receives the name of the video and the number of frames read.
+        `progress` receives the name of the video and the number of frames read.
 
         Raises
         ------
@@ -247,7 +247,7 @@ class VideoSource:
         regular, labels_by_frame = truth.spread(self.every, self.first, last), truth.by_frame()
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
-            width, advance = reader.info.width, steps(self.path.name, last)
+            width, advance = reader.info.width, progress(self.path.name, last)
             images, frames = peek(reader)
             with named_errors(self.path, VideoError):
                 detector = model.for_video(width, reader.info.height, images)
@@ -272,7 +272,7 @@ def mine(
     *,
     limits: MiningLimits = LIMITS,
     overwrite: bool = False,
-    steps: Steps = no_steps,
+    progress: Progress = no_progress,
 ) -> tuple[int, Counter[PatchKind]]:
     """Search the labelled frames, and write patches for training.
 
@@ -288,7 +288,7 @@ def mine(
         The model whose false alarms to find.
     limits
         Maximum numbers of patches in a frame, and the minimum probability of false alarms.
-    steps
+    progress
         Called for each source with its name and its number of frames.
 
     Returns
@@ -313,7 +313,7 @@ def mine(
     searched, counts = 0, Counter[PatchKind]()
     with patch_archive(output, overwrite=overwrite) as add:
         for stem, source in zip(names, sources, strict=True):
-            for frame, windows in source.choose(model, settings, limits, steps):
+            for frame, windows in source.choose(model, settings, limits, progress):
                 searched += 1
                 for chosen in windows:
                     x, y, side, _ = chosen.box.xywh

@@ -29,7 +29,7 @@ from vdet.errors import DataError
 from vdet.evaluate.output import figure, table
 from vdet.learn.svm.dataset import PatchFile
 from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
-from vdet.progress import Steps, no_steps
+from vdet.progress import Progress, no_progress
 from vdet.version import __version__
 
 log = logging.getLogger("vdet")
@@ -277,7 +277,7 @@ def train(
     settings: Settings,
     *,
     jobs: int | None = None,
-    steps: Steps = no_steps,
+    progress: Progress = no_progress,
 ) -> tuple[LinearModel, TrainingMetrics]:
     """Compute features, fit a model on a part of the patches, and test it on the others.
 
@@ -287,7 +287,7 @@ def train(
         If some have known sides, the model learns to find the sides of vehicles.
     jobs
         Number of threads that compute features; None: one per core.
-    steps
+    progress
         Called at the start of each step, with the number of patches or None.
 
     Returns
@@ -300,16 +300,16 @@ def train(
     DataError
         Patches are unreadable, or too few.
     """
-    progress = steps("describing patches", len(files))
+    advance = progress("describing patches", len(files))
     augmented = settings.train.svm.augmentation
-    data = extract(files, settings.svm.features, augmented=augmented, jobs=jobs, progress=progress)
+    data = extract(files, settings.svm.features, augmented=augmented, jobs=jobs, progress=advance)
     held = hold_out(data.groups)
     learnt, tested = ~(held | data.is_boxed), held & ~data.is_boxed
     if not tested.any():
         raise DataError("no folder has two patches, so none can be held out; add more")
-    steps("fitting the classifier", None)
+    progress("fitting the classifier", None)
     model = fit(data.of(learnt), settings)
-    steps("fitting the sides of boxes", None)
+    progress("fitting the sides of boxes", None)
     regression, box_error = fit_boxes(data, held, settings.svm.features.hog_length)
     metrics = TrainingMetrics(
         groups=dict(Counter(file.group for file in files)),

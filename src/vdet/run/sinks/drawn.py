@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 from vdet.boxes import Image
-from vdet.config.classes import OUR_NAMES
+from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.schema import Settings
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface, draw_lines
@@ -108,8 +108,8 @@ def draw_tracks(image: Image, tracks: Sequence[Track], parts: Sequence[str]) -> 
 
 def _class_number(name: str | None) -> int:
     """Return a number for the colour of a class; 0 if the class is unknown."""
-    if name in OUR_NAMES:
-        return OUR_NAMES.index(name) + 1
+    if name in STANDARD_CLASSES:
+        return STANDARD_CLASSES.index(name) + 1
     return zlib.crc32(name.encode()) if name else 0
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from vdet.boxes import BoolArray, Float64Array, coverage, iou_matrix
 from vdet.track.motion.pairing import differences
 from vdet.track.motion.state import carried
-from vdet.track.motion.vehicle import Vehicle
+from vdet.track.motion.vehicle import TrackedVehicle
 
 _REACH = 0.75
 _REACH_GROWTH = 0.35
@@ -104,7 +104,7 @@ def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
     return np.asarray(((coverage(boxes, boxes) > PART) & weaker).any(axis=1))
 
 
-def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
+def take_over_ids(vehicles: Sequence[TrackedVehicle]) -> list[TrackedVehicle]:
     """Pass the ids of lost vehicles to newly confirmed ones at their expected positions.
 
     A single detection is not enough: a vehicle that is found again is tracked as a new one at
@@ -140,7 +140,9 @@ class _Overlap:
     alike: bool
 
 
-def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list[Vehicle]:
+def without_duplicates(
+    vehicles: Sequence[TrackedVehicle], boxes: Float64Array
+) -> list[TrackedVehicle]:
     """Keep one track for each vehicle: the one with the highest score, else the oldest one.
 
     It keeps the id that has not been lost for longer. An unconfirmed track does not replace another
@@ -185,7 +187,10 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
 
 
 def _show_one_vehicle(
-    vehicle: Vehicle, higher: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]
+    vehicle: TrackedVehicle,
+    higher: TrackedVehicle,
+    overlap: _Overlap,
+    hidden: Sequence[TrackedVehicle],
 ) -> bool:
     """Return whether a track shows the vehicle of an overlapping one of higher rank, or a part.
 
@@ -204,14 +209,16 @@ def _show_one_vehicle(
     return is_inside and not (is_doubted or _comes_out(vehicle, higher, hidden))
 
 
-def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
+def _comes_out(
+    vehicle: TrackedVehicle, nearer: TrackedVehicle, hidden: Sequence[TrackedVehicle]
+) -> bool:
     """Return whether a `hidden` vehicle was near, and this one is as clear as the nearer one."""
     is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
     position = vehicle.state.mean[:, 0]
     return is_clear and any(_distance(item.state.mean[:, 0], position) < _NEAR for item in hidden)
 
 
-def _may_be(lost: Vehicle, new: Vehicle) -> bool:
+def _may_be(lost: TrackedVehicle, new: TrackedVehicle) -> bool:
     """Return whether a new vehicle may be the lost one.
 
     It is at the expected position, looks alike, does not drive the other way, and did not exist
@@ -226,7 +233,7 @@ def _may_be(lost: Vehicle, new: Vehicle) -> bool:
     return not turned and bool(differences(lost.appearance, new.appearance) < unlike)
 
 
-def _astray(lost: Vehicle, new: Vehicle) -> float:
+def _astray(lost: TrackedVehicle, new: TrackedVehicle) -> float:
     """Return the distance of a new vehicle from the expected position of a lost one, in sizes.
 
     Its current position also counts if only a part may have been seen at first: the lost vehicle

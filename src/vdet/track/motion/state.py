@@ -190,7 +190,7 @@ _ENTERING = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Estimate:
+class StateEstimate:
     """A vehicle after a searched frame.
 
     Attributes
@@ -230,16 +230,16 @@ class History:
         In order of time; at least one has a detection.
     """
 
-    def __init__(self, first: Estimate) -> None:
+    def __init__(self, first: StateEstimate) -> None:
         self.estimates = [first]
         self._smoothed: list[Float64Array] | None = None
 
     @property
-    def last_seen(self) -> Estimate:
+    def last_seen(self) -> StateEstimate:
         """The latest estimate with a detection."""
         return next(estimate for estimate in reversed(self.estimates) if estimate.score is not None)
 
-    def add(self, estimate: Estimate) -> None:
+    def add(self, estimate: StateEstimate) -> None:
         """Add the next estimate."""
         self.estimates.append(estimate)
         self._smoothed = None

@@ -12,7 +12,7 @@ from vdet.media import Picture
 from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
 from vdet.track.motion.pairing import appearances, buffered_iou, differences, pair
 from vdet.track.motion.state import Position, whole_box
-from vdet.track.motion.vehicle import Observation, SearchedFrame, Vehicle
+from vdet.track.motion.vehicle import FrameStep, Observation, TrackedVehicle
 from vdet.track.track import Track
 
 FIRST_STEP = 0.04
@@ -48,10 +48,10 @@ class MotionTracker:
     def __init__(self, settings: MotionTrackerSettings, width: int, height: int) -> None:
         self._settings = settings
         self._size = width, height
-        self._vehicles: list[Vehicle] = []
+        self._vehicles: list[TrackedVehicle] = []
         self._ids = count(1)
         self._time: float | None = None
-        self._gone: list[Vehicle] = []  # no longer tracked, but shown at earlier times
+        self._gone: list[TrackedVehicle] = []  # no longer tracked, but shown at earlier times
 
     def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
         """Track the vehicles into the next frame and show them; see `VideoTracker.update`."""
@@ -65,7 +65,7 @@ class MotionTracker:
         """
         observations = self._observations(detections, picture)
         seconds = FIRST_STEP if self._time is None else time - self._time
-        self._time, frame = time, SearchedFrame(time, seconds, self._size)
+        self._time, frame = time, FrameStep(time, seconds, self._size)
         longest = self._settings.keep_id_seconds + self._settings.keep_hidden_id_seconds
         self._keep([v for v in self._vehicles if v.unseen + seconds <= longest])
         for vehicle in self._vehicles:
@@ -79,7 +79,7 @@ class MotionTracker:
                 vehicle.miss(frame)
         self._keep(self._staying())
         new = [
-            Vehicle(observation, frame, self._settings)
+            TrackedVehicle(observation, frame, self._settings)
             for number, observation in enumerate(observations)
             if number not in pairs.values()
             # Detections with scores below the decay never add up to a vehicle.
@@ -118,7 +118,7 @@ class MotionTracker:
             for (vehicle, position), box in in_frame
         ]
 
-    def _position(self, vehicle: Vehicle, time: float) -> Position | None:
+    def _position(self, vehicle: TrackedVehicle, time: float) -> Position | None:
         """Return the position of a vehicle at a time; None if it is not shown then."""
         assert self._time is not None
         history = vehicle.history
@@ -130,12 +130,12 @@ class MotionTracker:
         mean = vehicle.state.moved(time - self._time)
         return Position(mean[:, 0], "predicted" if vehicle.unseen else "interpolated")
 
-    def _keep(self, vehicles: list[Vehicle]) -> None:
+    def _keep(self, vehicles: list[TrackedVehicle]) -> None:
         """Track only these vehicles; the others, if confirmed, can be shown at earlier times."""
         self._gone += [v for v in self._vehicles if v.confirmed and v not in vehicles]
         self._vehicles = vehicles
 
-    def _staying(self) -> list[Vehicle]:
+    def _staying(self) -> list[TrackedVehicle]:
         """Return the vehicles that are neither ended nor outside the frame."""
         inside = compress(self._vehicles, _are_large(self._boxes(self._vehicles)))
         return [vehicle for vehicle in inside if not vehicle.is_over]
@@ -155,7 +155,7 @@ class MotionTracker:
         """Return the part in the frame of each centre and size, `(n, 4)`; see `Position`."""
         return clipped(whole_box(np.reshape(means, (-1, 4))), self._size)
 
-    def _boxes(self, vehicles: Sequence[Vehicle]) -> Float64Array:
+    def _boxes(self, vehicles: Sequence[TrackedVehicle]) -> Float64Array:
         """Return the visible parts of vehicles, `(n, 4)`."""
         return self._visible([vehicle.state.mean[:, 0] for vehicle in vehicles])
 
@@ -226,7 +226,7 @@ class _Candidate:
     without and with misses as 0.
     """
 
-    vehicle: Vehicle
+    vehicle: TrackedVehicle
     position: Position
     box: Float64Array
     seen_score: float

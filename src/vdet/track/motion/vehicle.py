@@ -13,7 +13,7 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
-from vdet.track.motion.state import SCORE_TIME, Estimate, History, MotionState
+from vdet.track.motion.state import SCORE_TIME, History, MotionState, StateEstimate
 from vdet.track.votes import ClassVotes, vote_weight
 
 _MAX_EVIDENCE_SECONDS = 0.1
@@ -43,7 +43,7 @@ _MIN_SCORE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class SearchedFrame:
+class FrameStep:
     """A searched frame.
 
     `time` and `seconds` since the previous searched frame are in seconds; `size` is width and
@@ -93,7 +93,7 @@ class RecentMean:
         self._weight = decay * self._weight + (1 - decay)
 
 
-class Vehicle:
+class TrackedVehicle:
     """A tracked vehicle.
 
     Parameters
@@ -134,11 +134,11 @@ class Vehicle:
     """
 
     def __init__(
-        self, first: Observation, frame: SearchedFrame, settings: MotionTrackerSettings
+        self, first: Observation, frame: FrameStep, settings: MotionTrackerSettings
     ) -> None:
         self._settings = settings
         self.state = MotionState.at_rest(first.box, first.noise, frame.size)
-        self.history = History(Estimate(frame.time, self.state, first.score))
+        self.history = History(StateEstimate(frame.time, self.state, first.score))
         self.begin = self.since = frame.time
         self.appearance = first.appearance
         self.evidence = self.unseen = self.hidden = self.doubtful = 0.0
@@ -173,10 +173,10 @@ class Vehicle:
         """Move on to the next frame, `seconds` later."""
         self.state = self.state.predicted(seconds)
 
-    def see(self, observation: Observation, frame: SearchedFrame) -> None:
+    def see(self, observation: Observation, frame: FrameStep) -> None:
         """Add its detection in a frame."""
         self.state = self.state.corrected(observation.box, observation.noise, frame.size)
-        self.history.add(Estimate(frame.time, self.state, observation.score))
+        self.history.add(StateEstimate(frame.time, self.state, observation.score))
         if not self.is_present:
             self.since = frame.time
         self.unseen = self.hidden = 0.0
@@ -184,13 +184,13 @@ class Vehicle:
         self.appearance = decay * self.appearance + (1 - decay) * observation.appearance
         self._add(observation, frame)
 
-    def miss(self, frame: SearchedFrame) -> None:
+    def miss(self, frame: FrameStep) -> None:
         """Add a frame without a detection of it."""
         self.unseen += frame.seconds
         lost = self.unseen > self._settings.coast_seconds
         motion = math.exp(-frame.seconds / _SLOWING_TIME) if lost else 1.0
         self.state = self.state.slowed(motion, math.exp(-frame.seconds / _SETTLING_TIME))
-        self.history.add(Estimate(frame.time, self.state))
+        self.history.add(StateEstimate(frame.time, self.state))
         self._weigh(0.0, frame.seconds)
 
     def lose(self) -> None:
@@ -198,14 +198,14 @@ class Vehicle:
         self.evidence = 0.0
         self.unseen = max(self.unseen, self._settings.coast_seconds)
 
-    def take_over(self, earlier: "Vehicle") -> None:
+    def take_over(self, earlier: "TrackedVehicle") -> None:
         """Continue the id, history and votes of another track of the same vehicle."""
         self.id = self.id if earlier.id is None else earlier.id
         self.begin = min(self.begin, earlier.begin)
         self.history.join(earlier.history)
         self.votes.join(earlier.votes)
 
-    def merge(self, duplicate: "Vehicle") -> None:
+    def merge(self, duplicate: "TrackedVehicle") -> None:
         """Take over the history of another track that now shows the same vehicle.
 
         The id is that of the track that has not been lost for longer.
@@ -215,7 +215,7 @@ class Vehicle:
         self.id = min(ids)[1] if ids else None
         self.since = min(self.since, duplicate.since)
 
-    def _add(self, observation: Observation, frame: SearchedFrame) -> None:
+    def _add(self, observation: Observation, frame: FrameStep) -> None:
         self._weigh(observation.score, frame.seconds)
         self.detection_scores.add(observation.score, frame.seconds)
         weight = vote_weight(observation.box, observation.score, frame.size)
