@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +30,8 @@ Image = npt.NDArray[np.uint8]
 _Rows = slice | Sequence[int] | npt.NDArray[Any]
 
 EDGE = 0.005
-"""A box that ends this near to a side of the frame is cut off by it, fraction of the frame."""
+"""What is this near to a side of the frame lies on it, and a box is cut off: fraction of the frame.
+"""
 _NESTED = 0.8
 """Minimum fraction of a box inside another one that it is nested in."""
 
@@ -101,6 +102,10 @@ class Box:
         """x, y, width, height for files: the sides as whole pixels, at least one apart."""
         x1, y1, x2, y2 = self.pixels
         return x1, y1, max(1, x2 - x1), max(1, y2 - y1)
+
+    def cut_by(self, size: tuple[float, float]) -> "CutSides":
+        """Return which of its sides a frame of `size`, width and height, cuts off."""
+        return cut_sides((self.x1, self.y1, self.x2, self.y2), size)
 
     def cut(self, image: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return a view of the whole pixels of an image `(H, W, …)` in the box, clipped to it."""
@@ -316,6 +321,30 @@ def _column(
         raise ArgumentError(f"{name}: a value is not a finite number")
     column.flags.writeable = False
     return column
+
+
+class CutSides(NamedTuple):
+    """Whether the frame cuts off the sides of a box, or of `n` boxes, bool `(n,)`."""
+
+    left: Any
+    top: Any
+    right: Any
+    bottom: Any
+
+    @property
+    def hide_foot(self) -> Any:
+        """Whether the ground point is not known: the lower edge is not seen, or not all of it."""
+        return self.left | self.right | self.bottom
+
+
+def cut_sides(sides: Iterable[Any], size: tuple[float, float]) -> CutSides:
+    """Return which sides of a box a frame of `size`, width and height, cuts off.
+
+    `sides` are x1, y1, x2, y2, each a number or an array of `n` of them.
+    """
+    (x1, y1, x2, y2), (width, height) = sides, size
+    across, down = EDGE * width, EDGE * height
+    return CutSides(x1 <= across, y1 <= down, x2 >= width - across, y2 >= height - down)
 
 
 NO_BOXES = Boxes(np.empty((0, 4)), np.empty(0))

@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from vdet.boxes import EDGE, Box, Boxes, Float64Array, coverage, iou_matrix
+from vdet.boxes import Box, Boxes, Float64Array, coverage, cut_sides, iou_matrix
 from vdet.findings import Finding
 from vdet.media import Picture
 from vdet.track.track import Track
@@ -97,7 +97,7 @@ def _weak_boxes(picture: Picture, detections: Boxes, tracks: Sequence[Track]) ->
     sides = detections.sides
     rows = detections.scores >= _MIN_SCORE
     rows &= sides[:, 2] - sides[:, 0] >= _MIN_WIDTH * picture.width
-    rows &= sides[:, 3] < (1 - EDGE) * picture.height
+    rows &= ~cut_sides(sides.T, (picture.width, picture.height)).bottom
     sides = sides[rows]
     shown = np.array([astuple(track.box) for track in tracks]).reshape(-1, 4)
     inside = np.maximum(coverage(sides, shown), coverage(shown, sides).T)

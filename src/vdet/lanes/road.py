@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vdet.boxes import EDGE, Box, Float64Array, Image
+from vdet.boxes import Box, Float64Array, Image
 from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.draw.boxes import Color, Surface, draw_label, draw_lines, line_width, shade
@@ -129,9 +129,7 @@ class Road:
 
     def cuts(self, box: Box) -> bool:
         """Return whether the left, right or lower edge of the frame cuts the vehicle's box."""
-        width, height = self.size
-        beside = box.x1 <= EDGE * width or box.x2 >= (1 - EDGE) * width
-        return bool(beside or box.y2 >= (1 - EDGE) * height)
+        return bool(box.cut_by(self.size).hide_foot)
 
     def position(self, point: tuple[float, float]) -> RoadPosition | None:
         """Return where on the road a vehicle is that stands at a point of the frame.

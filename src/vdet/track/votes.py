@@ -7,7 +7,7 @@ end of a video, use the class of the last row.
 from collections import defaultdict
 from collections.abc import Mapping
 
-from vdet.boxes import EDGE, Float64Array
+from vdet.boxes import Float64Array, cut_sides
 from vdet.config.classes import UNKNOWN
 
 _USUAL, _USUAL_NEEDS = "car", 0.6
@@ -67,5 +67,4 @@ def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float
     """
     x1, y1, x2, y2 = map(float, box / (*size, *size))
     area = min((x2 - x1) * (y2 - y1), _CLOSE)
-    is_whole = min(x1, y1) > EDGE and max(x2, y2) < 1 - EDGE
-    return score * area * (1 if is_whole else _CUT_OFF)
+    return score * area * (_CUT_OFF if any(cut_sides((x1, y1, x2, y2), (1, 1))) else 1)

@@ -10,18 +10,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array
+from vdet.boxes import EDGE, BoolArray, Float64Array
 from vdet.config.shapes import ZONE_DIRECTIONS, TrafficSettings
 from vdet.polygons import Point, Segment, meeting, side_of, sides
 from vdet.traffic.linking import DURATION_DIGITS, VehiclePath
 
 ENTER, EXIT, APPEAR, VANISH = ZONE_DIRECTIONS
 
-_AT_EDGE = 0.002
-"""A point within this fraction of the frame's side (or one pixel) of the frame's edge lies on it.
-"""
-_MAX_AT_EDGE = 0.005
-"""Limit of that one pixel in small frames, as a fraction; lines are longer (`SHORTEST_LINE`)."""
 _INSIDE = 0.01
 """Points outside the frame are moved this far inside, pixels."""
 _SETTLED = 0.1
@@ -185,10 +180,9 @@ def lines_and_zones(
 
 def _snapped(value: float, length: float) -> float:
     """Return a coordinate, moved onto the edge of the frame if it is very near to it."""
-    reach = max(min(1.0, _MAX_AT_EDGE * length), _AT_EDGE * length)
-    if value <= reach:
+    if value <= EDGE * length:
         return 0.0
-    return float(length) if length - value <= reach else value
+    return float(length) if value >= length - EDGE * length else value
 
 
 @dataclass(frozen=True, slots=True)

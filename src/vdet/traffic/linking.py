@@ -8,7 +8,7 @@ from struct import Struct
 
 import numpy as np
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box, Float64Array, cut_sides
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 
@@ -281,9 +281,9 @@ class _Vehicle:
 
     def is_leaving(self, width: int, height: int) -> bool:
         """Return whether it is at the edge of the frame and moves outwards."""
-        x1, y1, x2, y2 = self.box.pixels
-        outward = complex((x2 >= width - 1) - (x1 <= 1), (y2 >= height - 1) - (y1 <= 1))
-        return (_velocity(self.rows) * outward.conjugate()).real > _LEAVING_SPEED * (y2 - y1)
+        cut = cut_sides(self.box.pixels, (width, height))
+        outward = complex(cut.right - cut.left, cut.bottom - cut.top)
+        return (_velocity(self.rows) * outward.conjugate()).real > _LEAVING_SPEED * self.box.xywh[3]
 
     def extrapolated(self, *times: float) -> Float64Array:
         """Return its last row, and a row for each later time at constant velocity."""

@@ -347,6 +347,5 @@ def _merit(track: Track, picture: Picture) -> _Merit | None:
     box = track.box.rounded
     if track.state != "detected" or min(box.width, box.height) < _MIN_SIDE:
         return None
-    inside = box.x2 < picture.width and box.y2 < picture.height
-    is_whole = inside and min(box.x1, box.y1) > 0
+    is_whole = not any(box.cut_by((picture.width, picture.height)))
     return is_whole, box.area * track.score

@@ -146,16 +146,15 @@ class SpeedMeter:
 
     def __init__(self, ground: Ground, width: int, height: int) -> None:
         self.ground = ground
-        self._sides = EDGE * width, (1 - EDGE) * width, (1 - EDGE) * height
+        self._size = width, height
         self._rows: dict[int, array[float]] = {}
         self._gone: dict[int, Speeds | None] = {}  # of vehicles that are no longer shown
 
     def add(self, frame: FrameTracks) -> None:
         """Add the next frame. Predicted boxes, and those cut off by the frame, are omitted."""
-        left, right, bottom = self._sides
         for track in frame.tracks:
             box = track.box
-            if track.state != "predicted" and left < box.x1 and box.x2 < right and box.y2 < bottom:
+            if track.state != "predicted" and not box.cut_by(self._size).hide_foot:
                 row = frame.time, *track.foot, box.width, box.height
                 self._rows.setdefault(track.id, array("d")).extend(row)
         oldest = frame.time - _GONE

@@ -18,6 +18,7 @@ from vdet.boxes import (
     Int64Array,
     are_nested,
     clipped,
+    cut_sides,
     iou_matrix,
 )
 from vdet.config.classes import standard_class
@@ -52,8 +53,6 @@ class Candidates:
 _FOUR_WHEELED = "car", "truck", "bus", "vehicle"
 _MAX_HEIGHT = 1.8
 """Maximum height of a vehicle with four wheels, in widths; what is higher is a sign or a post."""
-_EDGE = 0.01
-"""Distance from the left or right edge, as a fraction of the width, at which a box may be cut."""
 
 _USUAL = NetworkSettings().classes
 
@@ -127,7 +126,10 @@ class NetworkDetector:
         numbers = self.numbers[raw.classes.clip(-1, len(self.numbers) - 1)]
         rows = (numbers >= 0) & (numbers < len(names))
         rows &= (sides[:, 2:] - sides[:, :2] >= 1).all(axis=1)  # not with a NaN
-        rows &= ~(_have_four_wheels(numbers, names) & _are_too_high(sides, picture.width))
+        rows &= ~(
+            _have_four_wheels(numbers, names)
+            & _are_too_high(sides, (picture.width, picture.height))
+        )
         data = {}
         if raw.class_scores is not None:
             means_name = self.numbers[:-1, np.newaxis] == np.arange(len(names))
@@ -172,15 +174,14 @@ def _have_four_wheels(classes: Int32Array, names: Sequence[str]) -> BoolArray:
     return np.isin(classes, [n for n, name in enumerate(names) if name in _FOUR_WHEELED])
 
 
-def _are_too_high(sides: Float64Array, width: int) -> BoolArray:
+def _are_too_high(sides: Float64Array, size: tuple[int, int]) -> BoolArray:
     """Return for each box, `(n, 4)`, whether it is too high for a vehicle with four wheels.
 
-    The left or right edge of the picture, `width` pixels wide, may cut off a part of a vehicle.
+    A picture of this `size` may cut off a part of a vehicle on the left or right.
     """
-    margin = _EDGE * width
-    is_whole = (sides[:, 0] >= margin) & (sides[:, 2] <= width - margin)
+    cut = cut_sides(sides.T, size)
     too_high = sides[:, 3] - sides[:, 1] > _MAX_HEIGHT * (sides[:, 2] - sides[:, 0])
-    return np.asarray(is_whole & too_high)
+    return np.asarray(too_high & ~(cut.left | cut.right))
 
 
 def _mirrored(boxes: Boxes, width: int) -> Boxes:

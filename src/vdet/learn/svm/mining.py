@@ -9,6 +9,7 @@ Source of mining false alarms: Sung & Poggio, "Example-based Learning for View-b
 Detection", 1998; for HOG and linear SVM, Dalal & Triggs, 2005, section 4.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Box, Float64Array, coverage, from_xywh
+from vdet.boxes import BoolArray, Box, Float64Array, coverage, cut_sides, from_xywh
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import cut_window, resize
@@ -60,8 +61,6 @@ LIMITS = MiningLimits()
 
 _MAX_COVERED = 0.3
 """Maximum fraction of a false alarm covered by a vehicle or an ignore region."""
-
-_EDGE = 0.002  # of the frame's width: a box this close to a side of the frame is cut off by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +170,7 @@ def compare_windows(
     width, height = (vehicle[2:] - vehicle[:2])[:, np.newaxis] / size
     covered = coverage(windows, vehicle[np.newaxis])[:, 0]
 
-    cut = cut_sides(vehicle, frame_width)
+    cut = _beside(vehicle, frame_width)
     if cut.all():
         fits = shows = np.zeros(len(windows), np.bool_)
     elif cut.any():  # its height and its visible side decide
@@ -194,10 +193,10 @@ def _between(values: Float64Array, low: float, high: float) -> BoolArray:
     return (values > low) & (values < high)
 
 
-def cut_sides(vehicle: Float64Array, frame_width: int) -> BoolArray:
+def _beside(vehicle: Float64Array, frame_width: int) -> BoolArray:
     """Return whether the left and right side of the frame cut off a box `(4,)`, bool `(2,)`."""
-    edge = _EDGE * frame_width
-    return np.array([vehicle[0] <= edge, vehicle[2] >= frame_width - edge])
+    cut = cut_sides(vehicle, (frame_width, math.inf))
+    return np.array([cut.left, cut.right])
 
 
 PATCH = 64
@@ -254,7 +253,7 @@ class VideoSource:
             for frame in frames:
                 number = frame.index + 1
                 labels = labels_by_frame.get(number, [])
-                cuts_off = any(cut_sides(box, width).any() for box in _vehicles(labels))
+                cuts_off = any(_beside(box, width).any() for box in _vehicles(labels))
                 if number in regular or (number >= self.first and cuts_off):
                     windows, _ = detector.search(Picture(frame.image), None)
                     rng = np.random.default_rng(frame.index)

@@ -19,7 +19,7 @@ from typing import Self
 
 import numpy as np
 
-from vdet.boxes import EDGE, Float64Array
+from vdet.boxes import Float64Array, cut_sides
 from vdet.track.track import State
 
 _MAX_NEARER = 0.3
@@ -143,9 +143,8 @@ def whole_box(mean: Float64Array) -> Float64Array:
 
 
 def _ways_in(box: Float64Array, size: tuple[int, int]) -> tuple[int, int]:
-    (width, height), (x1, y1, x2, y2) = size, box.tolist()
-    across = (x1 <= EDGE * width) - (x2 >= width - EDGE * width)
-    return across, (y1 <= EDGE * height) - (y2 >= height - EDGE * height)
+    cut = cut_sides(box.tolist(), size)
+    return cut.left - cut.right, cut.top - cut.bottom
 
 
 def _measurement(box: Float64Array) -> Float64Array:
