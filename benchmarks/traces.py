@@ -20,7 +20,7 @@ from vdet.boxes import Image
 from vdet.synthetic.render import frames
 from vdet.track.track import FrameTracks
 from vdet.traffic.crossings import lines_and_zones
-from vdet.traffic.strips import Band, Passage, Passages, bands_of, layers_of, sampling_of
+from vdet.traffic.strips import Band, Passage, Passages, bands_of, sampling_of
 from vdet.traffic.traces import Trace, TraceSearch
 
 MISSED = 0.1
@@ -74,7 +74,7 @@ def lines_of(scene: PoleScene, truth: Sequence[FrameTracks]) -> list[Line]:
     samplings = [sampling_of(band, passages) for band, passages in pairs]
     strips: list[list[Image]] = [[] for _ in bands]
     for drawn in frames(scene.scene):
-        layers = layers_of(as_planes(drawn).picture)
+        layers = as_planes(drawn).picture.layers
         for strip, sampling in zip(strips, samplings, strict=True):
             strip.append(sampling.cut(layers))
     return [Line(*pair, strip) for pair, strip in zip(pairs, strips, strict=True)]

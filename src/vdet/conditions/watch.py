@@ -90,15 +90,11 @@ class Conditions:
 
 def planes_of(picture: Picture) -> tuple[Image, Image]:
     """Return the luma of a picture, full range, uint8: a plane, and one of half its size."""
-    planes, width = picture.planes, min(_WIDTH, picture.width)
+    width = min(_WIDTH, picture.width)
     height = max(1, round(picture.height * width / picture.width))
-    luma = planes.luma if planes else cv2.cvtColor(picture.image, cv2.COLOR_BGR2GRAY)
-    fine = cv2.resize(luma, (width, height), interpolation=cv2.INTER_AREA)
-    if planes and not planes.coding.full_range:
-        fine = cv2.convertScaleAbs(fine, alpha=255 / 219, beta=-16 * 255 / 219)
+    fine = picture.scaled_luma(width, height)
     half = max(1, width // 2), max(1, height // 2)
-    plane = cv2.resize(fine, half, interpolation=cv2.INTER_AREA)
-    return np.asarray(fine, np.uint8), np.asarray(plane, np.uint8)
+    return fine, np.asarray(cv2.resize(fine, half, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _enlarged(box: Box, scale: float) -> Box:

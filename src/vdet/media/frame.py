@@ -1,6 +1,6 @@
 """A frame of a video: its pixels (BGR, or decoder planes), its time, and its video."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -228,6 +228,50 @@ class Picture:
         self.height: int = pixels.shape[0]
         self.width: int = pixels.shape[1]
 
+    @property
+    def layers(self) -> tuple[Image, ...]:
+        """Luma, blue and red if it was made from planes, else the BGR image alone."""
+        return self.planes.layers if self.planes else (self.image,)
+
+    def to_bgr(self, layers: Sequence[Image]) -> Image:
+        """Convert its `layers`, cut or scaled, to BGR uint8 `(h, w, 3)`."""
+        if not self.planes:
+            return layers[0]
+        luma, blue, red = layers
+        return self.planes.coding.to_bgr((luma, blue, red))
+
+    def rows(self, rows: slice) -> tuple[Image, ...]:
+        """Return the `layers` of some rows; planes are converted to the common coding."""
+        if not self.planes:
+            return (self.image[rows],)
+        half = slice(rows.start // 2, -(-rows.stop // 2))
+        luma, *chroma = self.planes.layers
+        return self.planes.coding.to_common((luma[rows], chroma[0][half], chroma[1][half]))
+
+    def scaled_luma(self, width: int, height: int) -> Image:
+        """Return its luma in another size, full range, uint8 `(height, width)`."""
+        luma = self.planes.luma if self.planes else cv2.cvtColor(self.image, cv2.COLOR_BGR2GRAY)
+        scaled = cv2.resize(luma, (width, height), interpolation=cv2.INTER_AREA)
+        if self.planes and not self.planes.coding.full_range:
+            scaled = cv2.convertScaleAbs(scaled, alpha=255 / 219, beta=-16 * 255 / 219)
+        return np.asarray(scaled, np.uint8)
+
+    def mean_color(self, box: Float64Array) -> list[float]:
+        """Return the mean luma, blue and red chroma in a box, x1, y1, x2, y2; as in the planes."""
+        if self.planes:
+            parts = zip(self.planes.layers, (1, 2, 2), strict=True)
+            return [cv2.mean(_part(layer, box / scale))[0] for layer, scale in parts]
+        blue, green, red, _ = cv2.mean(_part(self.image, box))
+        luma = 0.114 * blue + 0.587 * green + 0.299 * red  # ITU-R BT.601
+        return [luma, 128 + 0.564 * (blue - luma), 128 + 0.713 * (red - luma)]
+
+    def to_encode(self, coding: Coding) -> "av.VideoFrame":
+        """Return it in a coding, with even sides, as a picture that the encoder may change."""
+        planes = self.planes
+        if planes is None or planes.coding != coding or self.width % 2 or self.height % 2:
+            planes = Planes.of_image(self.image, coding)
+        return (planes if planes.is_writable else planes.copy()).picture
+
     def copy(self, used: Planes | None = None) -> Image | Planes:
         """Return a copy of the pixels that may be changed: see `Planes.copy`."""
         return self.planes.copy(used) if self.planes else self.image.copy()
@@ -250,6 +294,13 @@ class Picture:
     def image(self) -> Image:
         """BGR uint8 `(H, W, 3)`; converted from planes on first use."""
         return self.pixels.to_image() if isinstance(self.pixels, Planes) else self.pixels
+
+
+def _part(image: Image, box: Float64Array) -> Image:
+    """Return the pixels in a box, at least one."""
+    x1, y1, x2, y2 = box.tolist()
+    x, y = min(int(x1), image.shape[1] - 1), min(int(y1), image.shape[0] - 1)
+    return image[y : max(round(y2), y + 1), x : max(round(x2), x + 1)]
 
 
 _16_BITS = ("gray16", "ya16", "rgb48", "rgba64")

@@ -18,7 +18,7 @@ from av.video.reformatter import ColorRange
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.media.demux import SAFELY, Demuxer
-from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Coding, Frame, Picture, Planes, VideoInfo
+from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Frame, VideoInfo
 from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
@@ -250,7 +250,7 @@ class VideoWriter:
             since = frame.time - self._origin
             last, self._last = self._last, max(self._last + 1, round(since / self._time_base))
             self._check_pause((self._last - last) * self._time_base)
-            picture = _to_encode(frame.picture, self._info.coding)
+            picture = frame.picture.to_encode(self._info.coding)
             picture.pts, picture.time_base = self._last, self._time_base
             picture.duration = round(self._period / self._time_base)
             self._container.mux(self._stream.encode(picture))
@@ -312,11 +312,3 @@ class VideoWriter:
         if info.coding.full_range:
             context.color_range = ColorRange.JPEG
         return stream
-
-
-def _to_encode(picture: Picture, coding: Coding) -> av.VideoFrame:
-    """Return a picture with even sides that the encoder may change."""
-    planes = picture.planes
-    if planes is None or planes.coding != coding or picture.width % 2 or picture.height % 2:
-        planes = Planes.of_image(picture.image, coding)
-    return (planes if planes.is_writable else planes.copy()).picture

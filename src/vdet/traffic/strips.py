@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float64Array, Image
-from vdet.media import Picture
 from vdet.polygons import Point, meeting
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.crossings import Border, Line
@@ -195,11 +194,6 @@ class Sampling:
             return cut
         merged = cv2.merge([cut, *map(self._half.cut, chroma)])
         return np.asarray(merged, np.uint8)
-
-
-def layers_of(picture: Picture) -> tuple[Image, ...]:
-    """Return luma, blue and red of a picture that consists of planes, else its BGR image."""
-    return picture.planes.layers if picture.planes else (picture.image,)
 
 
 def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:

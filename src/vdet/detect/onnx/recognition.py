@@ -221,11 +221,7 @@ def size_of_area(width: int, height: int, pixels: float) -> tuple[int, int]:
 
 def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
     """Return a picture as BGR in another size; planes are scaled before conversion."""
-    planes = picture.planes
-    if planes is None:
-        return _scaled(picture.image, width, height)
-    first, second, third = (_scaled(layer, width, height) for layer in planes.layers)
-    return planes.coding.to_bgr((first, second, third))
+    return picture.to_bgr([_scaled(layer, width, height) for layer in picture.layers])
 
 
 def _scaled(image: Image, width: int, height: int) -> Image:

@@ -101,15 +101,9 @@ class _Levels:
 
 def _levels(picture: Picture, rows: slice, margin: int) -> list[_Levels]:
     """Return luma, red and blue of the rows, or BGR."""
-    planes = picture.planes
-    if planes is None:
-        return [_Levels(_widened(picture.image[rows], margin))]
-    blue_red = slice(rows.start // 2, -(-rows.stop // 2))
-    luma, blue, red = planes.coding.to_common(
-        (planes.luma[rows], planes.blue[blue_red], planes.red[blue_red])
-    )
-    chroma = [_Levels(_widened(item, margin // 2), level=1) for item in (red, blue)]
-    return [_Levels(_widened(luma, margin)), *chroma]
+    first, *chroma = picture.rows(rows)
+    halves = [_Levels(_widened(item, margin // 2), level=1) for item in reversed(chroma)]
+    return [_Levels(_widened(first, margin)), *halves]
 
 
 def _widened(values: Image, margin: int) -> Image:

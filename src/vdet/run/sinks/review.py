@@ -27,7 +27,6 @@ from vdet.traffic.strips import (
     Passages,
     Sampling,
     bands_of,
-    layers_of,
     sampling_of,
 )
 from vdet.traffic.traces import Trace, TraceSearch
@@ -70,7 +69,7 @@ class _Strip:
         """Add a frame."""
         if len(passages) >= _ENOUGH:
             self.improve(passages)
-        self.rows.append((seconds, self.sampling.cut(layers_of(picture))))
+        self.rows.append((seconds, self.sampling.cut(picture.layers)))
 
     def improve(self, passages: list[Passage]) -> None:
         """Choose the sampling by the passages so far, unless it was chosen by enough of them."""

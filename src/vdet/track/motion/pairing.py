@@ -9,11 +9,10 @@ Easier by Buffering the Matching Space", 2023.
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float64Array, Image, Int64Array, iou
+from vdet.boxes import Float64Array, Int64Array, iou
 from vdet.media import Picture
 
 WIDEST_BUFFER = 0.25
@@ -75,7 +74,7 @@ def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
     inner = _widened(boxes, -_MARGIN)
     halves = np.stack([inner, inner], axis=1)
     halves[:, 0, 3] = halves[:, 1, 1] = inner[:, [1, 3]].mean(axis=1)
-    means = [_mean(picture, half) for half in halves.reshape(-1, 4)]
+    means = [picture.mean_color(half) for half in halves.reshape(-1, 4)]
     return np.reshape(means, (-1, 2, 3))
 
 
@@ -83,23 +82,6 @@ def differences(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the difference of appearances, `(…, 2, 3)`: 0 if they are equal or unknown."""
     units = (a - b) / _UNITS
     return np.asarray(np.sqrt(np.nan_to_num(units**2).mean(axis=(-2, -1))))
-
-
-def _mean(picture: Picture, box: Float64Array) -> list[float]:
-    planes = picture.planes
-    if planes is None:
-        blue, green, red, _ = cv2.mean(_part(picture.image, box))
-        luma = 0.114 * blue + 0.587 * green + 0.299 * red  # ITU-R BT.601
-        return [luma, 128 + 0.564 * (blue - luma), 128 + 0.713 * (red - luma)]
-    layers = zip(planes.layers, (1, 2, 2), strict=True)
-    return [cv2.mean(_part(layer, box / scale))[0] for layer, scale in layers]
-
-
-def _part(image: Image, box: Float64Array) -> Image:
-    """Return the pixels in a box, at least one."""
-    x1, y1, x2, y2 = box.tolist()
-    x, y = min(int(x1), image.shape[1] - 1), min(int(y1), image.shape[0] - 1)
-    return image[y : max(round(y2), y + 1), x : max(round(x2), x + 1)]
 
 
 def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> dict[int, int]:
