@@ -32,6 +32,13 @@ _Rows = slice | Sequence[int] | npt.NDArray[Any]
 EDGE = 0.005
 """What is this near to a side of the frame lies on it, and a box is cut off: fraction of the frame.
 """
+_MOVED, _SURELY = 0.2, 0.5
+"""Minimum distance of what has moved from its first position, in its sizes; the second to be sure.
+
+Boxes of what stands jitter by 0.03, or drift by 0.3 where something passes. If tracks were shown at
+0.5, a lorry of a real clip that scores low would be too late to be counted; if vehicles were
+counted at 0.2, parked ones would be.
+"""
 _NESTED = 0.8
 """Minimum fraction of a box inside another one that it is nested in."""
 
@@ -345,6 +352,11 @@ def cut_sides(sides: Iterable[Any], size: tuple[float, float]) -> CutSides:
     (x1, y1, x2, y2), (width, height) = sides, size
     across, down = EDGE * width, EDGE * height
     return CutSides(x1 <= across, y1 <= down, x2 >= width - across, y2 >= height - down)
+
+
+def has_moved(distance: float, size: float, *, surely: bool = False) -> bool:
+    """Return whether a vehicle of a size has moved, at a distance from its first position."""
+    return distance >= (_SURELY if surely else _MOVED) * size
 
 
 NO_BOXES = Boxes(np.empty((0, 4)), np.empty(0))

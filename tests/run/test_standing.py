@@ -19,13 +19,13 @@ PICTURE = Picture(np.zeros((240, WIDTH, 3), np.uint8))
 SIGN, CAR = Box.sized(10, 10, 20, 20), Box.sized(100, 50, 40, 30)
 
 
-def shown(*, moves: bool) -> list[list[int]]:
+def shown(*, is_moving: bool) -> list[list[int]]:
     """Return the frames that show each of five tracks.
 
     They are a sign, a car that drives off, a parked one, one that once scores high, and one that
     waits where the second one drove.
     """
-    step = StandingStep(Mock(Conditions, moves=moves), 0.6, WIDTH)
+    step = StandingStep(Mock(Conditions, is_moving=is_moving), 0.6, WIDTH)
     frames: list[list[int]] = [[] for _ in range(5)]
     for index in range(FRAMES):
         tracks = (
@@ -43,8 +43,8 @@ def shown(*, moves: bool) -> list[list[int]]:
 
 def test_a_fixed_camera_shows_what_moves_scores_high_or_is_where_others_drove() -> None:
     every = list(range(FRAMES))
-    assert shown(moves=False) == [[], every[3:], every, every[5:], every[3:]]
+    assert shown(is_moving=False) == [[], every[3:], every, every[5:], every[3:]]
 
 
 def test_a_moving_camera_shows_all() -> None:
-    assert shown(moves=True) == [list(range(FRAMES))] * 5
+    assert shown(is_moving=True) == [list(range(FRAMES))] * 5

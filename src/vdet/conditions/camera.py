@@ -59,8 +59,8 @@ class CameraWatch:
         position = self._reference + moved / plane.shape[1]
         before = self._positions[-1] if self._positions else position
         with np.errstate(invalid="ignore"):  # both may be other views
-            stood = bool(np.abs(position - before).max() <= _LIMIT / 2)
-        self._still_planes += stood
+            is_steady = bool(np.abs(position - before).max() <= _LIMIT / 2)
+        self._still_planes += is_steady
         self._times.append(time)
         self._positions.append(position)
         is_old = time - self._since > _RENEWED and np.isfinite(position).all()
@@ -68,15 +68,15 @@ class CameraWatch:
             if np.abs(moved).max() > _ERROR:  # so that small errors do not add up
                 self._reference = position
             self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
-        return stood
+        return is_steady
 
     @property
     def is_still(self) -> bool:
         """Whether the camera was fixed most of the time."""
-        return len(self._times) > 1 and not self.moves
+        return len(self._times) > 1 and not self.is_moving
 
     @property
-    def moves(self) -> bool:
+    def is_moving(self) -> bool:
         """Whether it moved in more than a tenth of the planes so far."""
         return self._still_planes < _STILL * len(self._times)
 

@@ -64,15 +64,15 @@ class MotionWatch:
         self._ended: list[list[float]] = []
         self._movers: list[Mover] = []
         self._starts: dict[int, Point] = {}
-        self._driven: set[int] = set()
+        self._travelled: set[int] = set()
         self._background = self._usual = np.empty((0, 0), np.float32)
         self._covered = np.empty((0, 0), np.uint8)
         self._time = 0.0
 
-    def add(self, time: float, plane: Image, boxes: Mapping[int, Box], *, stood: bool) -> None:
+    def add(self, time: float, plane: Image, boxes: Mapping[int, Box], *, is_steady: bool) -> None:
         """Add the next plane, uint8 `(h, w)`; `boxes` are those of vehicles by id, its pixels.
 
-        `stood` says whether the camera has not moved since the previous plane.
+        `is_steady` says whether the camera has not moved since the previous plane.
         """
         follow, self._time = np.float32(min(1.0, time - self._time) * _RATE), time
         before, self._covered = self._covered, np.zeros_like(plane)
@@ -80,8 +80,8 @@ class MotionWatch:
             box.cut(self._covered)[:] = 1
             start = self._starts.setdefault(number, box.center)
             if math.dist(start, box.center) >= _TRAVEL * plane.shape[1]:
-                self._driven.add(number)
-        if not stood or not self._background.size:
+                self._travelled.add(number)
+        if not is_steady or not self._background.size:
             self._background, self._movers = plane.astype(np.float32), []
             self._usual = np.full(plane.shape, _CONTRAST / _NOISE, np.float32)
             return
@@ -96,7 +96,7 @@ class MotionWatch:
     def findings(self) -> list[Finding]:
         """Return the fraction of travelling objects that are not detected vehicles, and when."""
         undetected = self._ended + self._undetected(self._movers)
-        fraction = len(undetected) / max(1, len(undetected) + len(self._driven))
+        fraction = len(undetected) / max(1, len(undetected) + len(self._travelled))
         if len(undetected) < _MIN_MOVERS or fraction < _MIN_FRACTION:
             return []
         spans = joined(sorted(itertools.chain.from_iterable(undetected)))

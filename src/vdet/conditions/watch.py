@@ -54,14 +54,14 @@ class Conditions:
         self._measures.append(visibility.measure(fine_plane, plane, detections.scores))
         self._wet.append(is_wet(fine_plane))
         is_clear = not visibility.reasons(self._measures[-1][np.newaxis], self._wet[-1])[0]
-        stood = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
-        self._motion.add(time, plane, boxes, stood=stood)
+        is_steady = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
+        self._motion.add(time, plane, boxes, is_steady=is_steady)
         self._weak.add(time, picture, detections, tracks)
 
     @property
-    def moves(self) -> bool:
+    def is_moving(self) -> bool:
         """Whether the camera moved in more than a tenth of the planes so far."""
-        return self._camera.moves
+        return self._camera.is_moving
 
     def findings(self) -> Findings:
         """Return the findings so far, except those that the settings suppress."""

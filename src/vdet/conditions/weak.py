@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Float64Array, coverage, cut_sides, iou_matrix
+from vdet.boxes import Box, Boxes, Float64Array, coverage, cut_sides, has_moved, iou_matrix
 from vdet.findings import Finding
 from vdet.media import Picture
 from vdet.track.track import Track
@@ -27,8 +27,6 @@ _SAME_IOU, _GAP = 0.4, 0.5
 """Minimum overlap of consecutive detections of one object, and the maximum seconds between them."""
 _SHORTEST = 3.0
 """Minimum seconds between the first and the last detection of an object."""
-_MOVED = 0.1
-"""Minimum distance from its first position, in sizes; jitter of what is fixed is about 0.03."""
 
 
 @dataclass(slots=True, eq=False)
@@ -42,7 +40,7 @@ class _Object:
     has_moved: bool = False
 
     @property
-    def lasts(self) -> bool:
+    def is_lasting(self) -> bool:
         """Whether it is detected for long enough, and is not fixed to the camera."""
         return self.last - self.first >= _SHORTEST and self.has_moved
 
@@ -50,7 +48,7 @@ class _Object:
         """Add the next detection."""
         self.last, self.box = time, box
         distance = math.dist(self.start.center, box.center)
-        self.has_moved |= distance >= _MOVED * box.size
+        self.has_moved |= has_moved(distance, box.size)
 
 
 class WeakWatch:
@@ -71,13 +69,15 @@ class WeakWatch:
                 if overlaps[best] >= _SAME_IOU:
                     item.add(time, Box(*boxes[best].tolist()))
                     boxes = np.delete(boxes, best, axis=0)
-        self._objects = [item for item in self._objects if item.lasts or time - item.last <= _GAP]
+        self._objects = [
+            item for item in self._objects if item.is_lasting or time - item.last <= _GAP
+        ]
         new = (Box(*sides) for sides in boxes.tolist())
         self._objects += [_Object(time, time, box, box) for box in new]
 
     def findings(self) -> list[Finding]:
         """Return when weak detections lasted without a track."""
-        lasting = [item for item in self._objects if item.lasts]
+        lasting = [item for item in self._objects if item.is_lasting]
         seconds = {n for item in lasting for n in range(int(item.first), int(item.last) + 1)}
         if not seconds:
             return []

@@ -113,7 +113,7 @@ class VideoPage:
             start=self.player.start if self.player else 0.0,
             seconds=max(0.0, self.seconds),
             frames=self.frames,
-            vehicles=len(self._driven),
+            vehicles=len(self._moved),
             max_at_once=self._max_at_once,
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
@@ -123,9 +123,9 @@ class VideoPage:
         )
 
     @property
-    def _driven(self) -> list[VehicleRecord]:
+    def _moved(self) -> list[VehicleRecord]:
         """The vehicles that drove."""
-        return [record for record in self.records if record.has_driven]
+        return [record for record in self.records if record.has_moved]
 
     @property
     def _max_at_once(self) -> int:
@@ -216,8 +216,8 @@ class VideoPage:
     def _figures(self) -> list[tuple[str, str]]:
         """Return the key figures."""
         shown = sum(record.seconds for record in self.records) / max(1, len(self.records))
-        stood = Counter(record.motion for record in self.records if not record.has_driven)
-        driven = self._driven
+        stood = Counter(record.motion for record in self.records if not record.has_moved)
+        driven = self._moved
         classes = Counter(record.class_name for record in driven if record.class_name)
         return [
             (plural(len(driven), "vehicle"), str(len(driven))),
@@ -238,7 +238,7 @@ class VideoPage:
         if len(first) == 1:
             return []
         appeared: defaultdict[str, Counter[float]] = defaultdict(Counter)
-        for record in self._driven:
+        for record in self._moved:
             start = first[intervals.number(0, record.first)]
             appeared[record.class_name or UNKNOWN][start] += 1
         counted: defaultdict[str, Counter[float]] = defaultdict(Counter)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from vdet.boxes import Box, Image
+from vdet.boxes import Box, Image, has_moved
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
@@ -23,11 +23,6 @@ if TYPE_CHECKING:  # what an image does not need is loaded where it is used
     from vdet.conditions.watch import Conditions
     from vdet.lanes.road import Road, RoadFinder
 
-_MOVED = 0.2
-"""Minimum distance of a moving vehicle from its first position, in its sizes.
-
-Jitter of boxes is about 0.03. Counts and records need more, to be sure: see `has_moved`.
-"""
 _CELL = 0.01
 """Side of the cells in which vehicles drove, as a fraction of the width."""
 
@@ -201,12 +196,12 @@ class StandingStep:
         """Keep the tracks to show; all, if the camera moves."""
         for track in result.tracks:
             start = self._starts.setdefault(track.id, track.foot)
-            if math.dist(start, track.foot) >= _MOVED * track.box.size:
+            if has_moved(math.dist(start, track.foot), track.box.size):
                 self._driven.add(self._cell_of(*track.foot))
                 self._shown.add(track.id)
             elif track.score >= self._min_score:
                 self._shown.add(track.id)
-        if self._conditions.moves:
+        if self._conditions.is_moving:
             return result
         return replace(result, tracks=tuple(filter(self._is_shown, result.tracks)))
 

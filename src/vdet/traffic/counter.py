@@ -156,7 +156,7 @@ class VehicleCounter:
     def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
         """Return the passages that count: of the classes, seen long enough, and not parked."""
         minimum, classes = self._settings.traffic.min_seen_seconds, self._settings.classes
-        seen = (path for path in paths if path.seconds >= minimum and path.has_driven)
+        seen = (path for path in paths if path.seconds >= minimum and path.has_moved)
         return [self._passage(path) for path in seen if is_chosen(path.class_name, classes)]
 
     def _passage(self, path: VehiclePath) -> _Passage:

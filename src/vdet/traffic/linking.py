@@ -8,7 +8,7 @@ from struct import Struct
 
 import numpy as np
 
-from vdet.boxes import Box, Float64Array, cut_sides
+from vdet.boxes import Box, Float64Array, cut_sides, has_moved
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 
@@ -39,8 +39,6 @@ _MAX_GROWTH = 2.0
 """Maximum ratio of the heights of the last box of a track and the first one of the next."""
 _EXTRAPOLATED = 0.2, 0.3
 """Seconds after its last position at which a lost vehicle gets another; two settle a crossing."""
-_MOVED = 0.5
-"""Distance that a vehicle must move to have driven, as a fraction of its size."""
 _LEAVING_SPEED = 0.1
 """Minimum speed of a vehicle that leaves the frame or turns, in heights of its box per second."""
 _VELOCITY_ROWS = 20
@@ -93,9 +91,9 @@ class VehiclePath:
     size: float
 
     @property
-    def has_driven(self) -> bool:
+    def has_moved(self) -> bool:
         """Whether it moved while it was seen, and did not stand the whole time."""
-        return has_moved(self.points[: self.seen], self.size)
+        return path_moves(self.points[: self.seen], self.size)
 
     @property
     def seconds(self) -> float:
@@ -103,9 +101,9 @@ class VehiclePath:
         return round(float(self.times[self.seen - 1] - self.times[0]), DURATION_DIGITS)
 
 
-def has_moved(points: Float64Array, size: float) -> bool:
-    """Return whether one of points `(n, 2)` is half a vehicle's size or more from the first one."""
-    return bool(np.hypot(*(points - points[0]).T).max() >= _MOVED * size)
+def path_moves(points: Float64Array, size: float) -> bool:
+    """Return whether a vehicle of a size has moved at one of the points `(n, 2)` of its path."""
+    return has_moved(float(np.hypot(*(points - points[0]).T).max()), size, surely=True)
 
 
 def link_tracks(frames: Iterable[FrameTracks], width: int, height: int) -> list[VehiclePath]:

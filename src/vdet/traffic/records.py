@@ -16,7 +16,7 @@ from vdet.media.images import coarse_scale, shrunk
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
-from vdet.traffic.linking import has_moved
+from vdet.traffic.linking import path_moves
 from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, plain_time, write_content
 
@@ -97,7 +97,7 @@ class VehicleRecord:
         return next((lane for lane, _ in self.lanes.most_common(1)), None)
 
     @property
-    def has_driven(self) -> bool:
+    def has_moved(self) -> bool:
         """Whether it moved, or may have, because the camera may have moved."""
         return self.motion in (None, "drove")
 
@@ -142,7 +142,7 @@ class VehicleRecord:
     def judge(self) -> None:
         """Set `motion`, for a still camera."""
         stood: Motion = "standing" if self.seconds >= _STANDING else "unknown"
-        moved = has_moved(np.array(self.path), self.largest.size)
+        moved = path_moves(np.array(self.path), self.largest.size)
         self.motion = "drove" if moved else stood
 
     def _go_to(self, point: Point) -> None:
