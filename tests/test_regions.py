@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import PIL.Image
 import pytest
 
 from vdet.config.schema import Settings
@@ -57,6 +58,35 @@ class TestMasks:
             region = RegionSettings(name="a", mask=str(tmp_path / name))
             with pytest.raises(ImageError, match=name):
                 check_masks([region])
+
+    @pytest.mark.parametrize("mode", ["RGBA", "LA", "P"])
+    def test_what_is_transparent_is_not_in_it(
+        self, tmp_path: Path, mode: str, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        alpha = np.zeros((9, 16), np.uint8)
+        image = PIL.Image.new("RGB", (16, 9), "white").convert(mode)
+        if mode == "P":  # index 0 is white, and transparent
+            image = PIL.Image.fromarray(alpha)
+            image.putpalette([255] * 6)
+            image.paste(1, (8, 0, 16, 9))
+            image.save(tmp_path / "mask.png", transparency=0)
+        else:
+            alpha[:, 8:] = 255
+            image.putalpha(PIL.Image.fromarray(alpha))
+            image.save(tmp_path / "mask.png")
+        mask = {"name": "mask", "mask": str(tmp_path / "mask.png")}
+        expected = np.arange(16) >= 8
+        assert (laid(mask, size=(16, 9)).pixels == expected).all()
+        check_masks(Settings.model_validate({"regions": [mask]}).regions)
+        assert caplog.messages == []
+
+    def test_one_that_covers_the_whole_frame_gives_a_warning(
+        self, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        write_image(tmp_path / "mask.png", np.full((9, 16, 3), 255, np.uint8))
+        check_masks([RegionSettings(name="a", mask=str(tmp_path / "mask.png"))])
+        text = "covers the whole frame; draw what is outside in black"
+        assert caplog.messages == [f"{tmp_path}/mask.png: {text}"]
 
     @pytest.mark.parametrize("white", [0, 1])
     def test_one_without_white_is_refused_before_any_work(self, tmp_path: Path, white: int) -> None:

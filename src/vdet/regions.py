@@ -1,5 +1,6 @@
 """Regions: the parts of the frames of one video in which vehicles are shown."""
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from vdet.config.shapes import RegionSettings, aspect_problem
 from vdet.errors import ConfigError
 from vdet.media.images import read_image
 from vdet.polygons import Point
+
+log = logging.getLogger("vdet")
 
 _WHITE = 128
 """Minimum value of a pixel of a mask that is included."""
@@ -66,15 +69,19 @@ class Regions:
 
 
 def check_masks(settings: Sequence[RegionSettings]) -> None:
-    """Check that all masks can be read and have white. Raises `ImageError`, `ConfigError`."""
+    """Check that all masks can be read and have white. Raises `ImageError`, `ConfigError`.
+
+    There is a warning (logger "vdet") if one covers the whole frame.
+    """
     for setting in settings:
-        if setting.mask:
-            _read_grey(setting.mask)
+        if setting.mask and _read_grey(setting.mask).min() >= _WHITE:
+            log.warning("%s: covers the whole frame; draw what is outside in black", setting.mask)
 
 
 def _read_grey(path: str) -> Image:
-    """Return the grey values of a mask, uint8 `(H, W)`."""
-    grey = np.asarray(cv2.cvtColor(read_image(Path(path)), cv2.COLOR_BGR2GRAY), np.uint8)
+    """Return the grey values of a mask, uint8 `(H, W)`; what is transparent is black."""
+    image = read_image(Path(path), on_black=True)
+    grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
     if (brightest := int(grey.max())) < _WHITE:
         raise ConfigError(
             f"{path}: has no white: its brightest pixel is {brightest} of 255; "

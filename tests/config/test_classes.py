@@ -7,9 +7,11 @@ WANTED = ("car", "truck", "bus", "vehicle")
 
 
 def test_names_of_others_are_taken_for_ours() -> None:
-    names = ("Van", "lorry", "coach", "person", "vehicle", "trailer", "motorbike")
+    names = ("Van", "lorry", "coach", "person", "vehicle", "trailer", "Two wheeler")
     assert our_classes(names, WANTED) == [0, 1, 2, -1, 3, -1, -1]
     assert our_classes(names, (*WANTED, "motorcycle"))[-1] == 4
+    others = ("HGV", "LGV", "minibus", "Jeep", "ambulance", "auto", "E-Rickshaw", "tricycle")
+    assert our_classes(others, WANTED) == [1, 0, 2, 0, 0, 3, 3, 3]
 
 
 def test_any_class_that_the_network_knows_may_be_wanted() -> None:

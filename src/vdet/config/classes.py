@@ -11,13 +11,19 @@ UNKNOWN = "vehicle"
 """Name of a vehicle of unknown class, also for formats that need a name."""
 
 WORDS = {
-    "car": ("car", "van", "suv", "taxi", "pickup", "pickup truck"),
-    "truck": ("truck", "lorry"),
-    "bus": ("bus", "coach"),
-    "motorcycle": ("motorcycle", "motorbike", "motor", "motorcyclist", "scooter"),
+    "car": (
+        *("car", "van", "suv", "taxi", "pickup", "pickup truck", "jeep", "ambulance"),
+        *("LGV", "light goods vehicle"),
+    ),
+    "truck": ("truck", "lorry", "HGV", "heavy goods vehicle"),
+    "bus": ("bus", "coach", "minibus"),
+    "motorcycle": ("motorcycle", "motorbike", "motor", "motorcyclist", "scooter", "two-wheeler"),
     "bicycle": ("bicycle", "bike", "cyclist"),
     "person": ("person", "pedestrian", "person sitting"),
-    "vehicle": ("vehicle", "other vehicle", "rickshaw", "auto-rickshaw", "tuk-tuk", "tempo"),
+    "vehicle": (
+        *("vehicle", "other vehicle", "rickshaw", "auto-rickshaw", "auto", "e-rickshaw"),
+        *("tuk-tuk", "tempo", "tricycle", "awning-tricycle"),
+    ),
 }
 """Synonyms of `STANDARD_CLASSES` in label files and networks."""
 

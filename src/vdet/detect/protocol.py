@@ -45,6 +45,12 @@ def stage_images_of(detector: VideoDetector) -> StageImages:
     return getattr(detector, "stage_images", lambda *_: {})
 
 
+def warnings_of(model: "DetectorModel") -> list[str]:
+    """Return what a model says of its results, after a run: its method `warnings`, if present."""
+    warnings: list[str] = getattr(model, "warnings", list)()
+    return warnings
+
+
 @runtime_checkable
 class DetectorModel(Protocol):
     """A detector loaded from settings and a model file; threads may share it."""

@@ -86,10 +86,11 @@ def upright(image: Image, orientation: Orientation) -> Image:
     return turned.astype(np.uint8, copy=False)
 
 
-def read_image(path: Path) -> Image:
+def read_image(path: Path, *, on_black: bool = False) -> Image:
     """Read an image, rotated upright by its EXIF data.
 
-    A truncated JPEG file is read up to the cut, with a warning.
+    A truncated JPEG file is read up to the cut, with a warning. With `on_black`, the image is laid
+    on black where it is transparent.
 
     Returns
     -------
@@ -104,7 +105,7 @@ def read_image(path: Path) -> Image:
         `MAX_IMAGE_SIDE`.
     """
     data = read_encoded(path)
-    image = _decode(data, path)
+    image = _decode(data, path, on_black=on_black)
     if _is_cut_off(data):
         log.warning("%s: is truncated; read up to the cut", path)
     return image
@@ -222,12 +223,16 @@ def _orientation(image: ImageFile) -> Orientation:
     return Orientation()
 
 
-def _decode(data: bytes, path: Path) -> Image:
+def _decode(data: bytes, path: Path, *, on_black: bool = False) -> Image:
     image = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
     # Pillow itself rotates TIFF.
     turn = Orientation() if image.format == "TIFF" else _orientation(image)
     with _naming_errors(path):
-        return upright(_to_bgr(image, data), turn)
+        bgr = _to_bgr(image, data)
+        if on_black and (again := _open(data, path)).has_transparency_data:
+            alpha = np.asarray(again.convert("RGBA").getchannel("A"))
+            bgr = np.asarray(bgr * (alpha[..., np.newaxis] / 255), np.uint8)
+        return upright(bgr, turn)
 
 
 def _to_bgr(image: ImageFile, data: bytes) -> Image:

@@ -1,5 +1,6 @@
 """Vehicles in single images: read the image, detect, pass the result to the sinks."""
 
+import logging
 import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ from pathlib import Path
 from vdet.boxes import Boxes, Image
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, stage_images_of
+from vdet.detect.protocol import DetectorModel, stage_images_of, warnings_of
 from vdet.errors import ImageError
 from vdet.files import OutputFiles, is_hidden
 from vdet.media import Frame, Picture
@@ -21,6 +22,8 @@ from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
 from vdet.run.steps import ParallelStep, StepContext, make_steps
 from vdet.run.threads import SearchThreads
 from vdet.track.track import Track
+
+_log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +181,8 @@ def run_images(
                     sinks.write(result)
                     shared_sinks.write(result)
             yield result
+        for warning in warnings_of(search.model):
+            _log.warning("%s", warning)
 
 
 def _common_folders(jobs: Sequence[ImageJob]) -> list[Path]:

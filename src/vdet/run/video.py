@@ -12,7 +12,7 @@ from typing import Any
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model, load_detector
-from vdet.detect.protocol import VideoDetector, stage_images_of
+from vdet.detect.protocol import VideoDetector, stage_images_of, warnings_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import FileIds, OutputFiles, valid_text
 from vdet.findings import Finding
@@ -179,6 +179,8 @@ def open_video(
                         traffic.add(result.frame_tracks)
                     yield result.of_classes(settings.classes)
             facts.update(pipeline.facts())
+            for warning in warnings_of(parts.model):
+                log.warning("%s: %s", run.source, warning)
             if with_traffic:
                 traffic.end(findings_in(facts))
                 if counts := traffic.counts():

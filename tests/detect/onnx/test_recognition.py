@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from onnx import TensorProto, helper
 
+from conftest import Run
 from detect.onnx.graphs import Form, RedBox, final, ultralytics, write_graph, write_network
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import NetworkSettings
@@ -19,6 +20,7 @@ from vdet.detect.onnx.recognition import COCO, cell_centers, recognize, vdet_cel
 from vdet.detect.onnx.session import Session
 from vdet.errors import ModelError
 from vdet.media import Picture
+from writing import write_image
 
 SIZE = 128, 64
 FRAME = 256, 256
@@ -151,6 +153,40 @@ def test_names_can_be_given_and_one_class_without_a_name_is_of_vehicles(tmp_path
     assert class_names(found) == ["bus"]
     with pytest.raises(ModelError, match=r"has 2 classes and 1 names"):
         detect(path, frame_with_red(128, 128), class_names=["bus"])
+
+
+def test_classes_that_are_not_used_are_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    form = ultralytics(SIZE, RedBox(64, 32, 16, 8, 1), 4)
+    names = {"names": str(["car", "trailer", "person", "traffic light"])}
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=ULTRALYTICS | names)
+    assert class_names(detect(path, frame_with_red(128, 128))) == []
+    text = f"{path}: not reported: trailer; if vehicles, set detector.classes"
+    assert caplog.messages == [text]
+    assert class_names(detect(path, frame_with_red(128, 128), classes=["trailer"])) == ["trailer"]
+    assert caplog.messages == [text]
+
+
+@pytest.mark.parametrize(
+    ("class_id", "words"),
+    [
+        (0, "found only class 0, a person in COCO; set detector.class_names"),
+        (90, "found class 90, but COCO has 0 to 79; set detector.class_names"),
+        (CAR, ""),
+    ],
+)
+def test_a_network_without_names_may_have_other_classes_than_coco(
+    run: Run, tmp_path: Path, class_id: int, words: str
+) -> None:
+    form = final(RedBox(64, 32, 16, 8, class_id))
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
+    write_image(tmp_path / "in.png", frame_with_red(128, 128))
+    result = run("detect-image", tmp_path / "in.png", "--model", path, code=0)
+    assert words in result.err
+    assert bool(words) == ("the network has no names" in result.err)
+    named = ("--set", f"detector.class_names={['car'] * 91}")
+    assert run("detect-image", tmp_path / "in.png", "--model", path, *named, code=0).err == ""
 
 
 def test_a_network_without_a_wanted_class_is_refused(tmp_path: Path) -> None:

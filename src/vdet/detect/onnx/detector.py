@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,10 +23,10 @@ from vdet.boxes import (
 )
 from vdet.config.classes import standard_class
 from vdet.config.schema import NetworkSettings
-from vdet.detect.onnx.recognition import Recognized, recognize
+from vdet.detect.onnx.recognition import COCO, Recognized, recognize
 from vdet.detect.onnx.session import Session
 from vdet.draw.boxes import GREEN, draw_box
-from vdet.errors import ModelError
+from vdet.errors import ModelError, printable
 from vdet.media import Picture
 
 log = logging.getLogger("vdet")
@@ -55,6 +55,7 @@ _MAX_HEIGHT = 1.8
 """Maximum height of a vehicle with four wheels, in widths; what is higher is a sign or a post."""
 
 _USUAL = NetworkSettings().classes
+_MAX_LISTED = 10  # names in a message
 
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
 
@@ -81,12 +82,32 @@ class NetworkModel:
             raise ModelError(f"{path}: has none of detector.classes, only {', '.join(names)}")
         if missing := {*settings.classes} - {*detectable, *_USUAL}:
             log.warning("%s: lacks detector.classes %s", path, ", ".join(sorted(missing)))
+        unused = [
+            printable(name)
+            for name, number in zip(names, self._numbers.tolist(), strict=False)
+            if number == -1 and standard_class(name) is None and name not in COCO
+        ]
+        if unused and "classes" not in settings.model_fields_set:
+            listed = ", ".join(unused[:_MAX_LISTED]) + (" …" if len(unused) > _MAX_LISTED else "")
+            log.warning("%s: not reported: %s; if vehicles, set detector.classes", path, listed)
+        self._seen = set[int]()
+
+    def warnings(self) -> list[str]:
+        """Return what is odd about the classes that were found, in all videos and images."""
+        if self._recognized.is_named or not self._seen:
+            return []
+        seen, last = "", len(self._recognized.names) - 1
+        if (largest := max(self._seen)) > last:
+            seen = f"found class {largest}, but COCO has 0 to {last}"
+        elif largest == 0:
+            seen = "found only class 0, a person in COCO"
+        return [f"the network has no names, and {seen}; set detector.class_names"] if seen else []
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002
         """Return a detector for frames of one size."""
         network = self._recognized.for_frames(width, height)
         larger = self._recognized.for_frames(width, height, _LARGER)
-        return NetworkDetector(network, larger, self._numbers, self._settings)
+        return NetworkDetector(network, larger, self._numbers, self._settings, self._seen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,13 +117,14 @@ class NetworkDetector:
     Our networks search a single image twice, the second time mirrored and with a larger input, as
     `larger`; for networks of other tools, `larger` is `network`. `numbers` has the index of each
     class of the network in `combined_classes`, -1 for other classes; its last entry, -1, stands for
-    unknown classes.
+    unknown classes. The classes that the network finds are added to `seen`.
     """
 
     network: Recognized
     larger: Recognized
     numbers: Int32Array
     settings: NetworkSettings
+    seen: set[int] = field(default_factory=set)
     is_stateless: ClassVar[bool] = True
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
@@ -122,6 +144,8 @@ class NetworkDetector:
     def _find(self, network: Recognized, picture: Picture, names: Sequence[str]) -> Boxes:
         """Return the boxes of the named classes, the first of `combined_classes`, unsuppressed."""
         raw = network.find(picture, self.settings.min_score)
+        if not network.is_named:
+            self.seen.update(raw.classes.tolist())
         sides = clipped(raw.sides.astype(np.float64), (picture.width, picture.height))
         numbers = self.numbers[raw.classes.clip(-1, len(self.numbers) - 1)]
         rows = (numbers >= 0) & (numbers < len(names))

@@ -255,6 +255,8 @@ class Recognized:
         Converts its output to boxes.
     header
         The header of our networks; None for others.
+    is_named
+        Whether the names are known; if not, they are assumed to be those of COCO.
     """
 
     session: Session
@@ -263,6 +265,7 @@ class Recognized:
     form: InputForm
     layout: OutputLayout
     header: Header | None = None
+    is_named: bool = True
 
     def for_frames(self, width: int, height: int, scale: float = 1.0) -> "Recognized":
         """Return the network with an input for frames of one size, width and height in pixels.
@@ -353,7 +356,8 @@ def _foreign(session: Session, names: tuple[str, ...]) -> Recognized:
     cells = len(cell_centers(form.width, form.height)[1])
     match outputs[0].shape:
         case (1, rows, 6) if rows <= _MAX_FINAL_ROWS:
-            return Recognized(session, "boxes after suppression", names or COCO, form, final_rows)
+            name = "boxes after suppression"
+            return Recognized(session, name, names or COCO, form, final_rows, is_named=bool(names))
         case (1, rows, columns) if columns == cells and rows > 4:
             names = names or {80: COCO, 1: ("vehicle",)}.get(rows - 4, ())
             if len(names) == rows - 4:
