@@ -33,19 +33,35 @@ def test_the_rate_is_that_of_the_stream(
     spec: dict[str, Any] = {"codec": CODECS[suffix], "rate": rate, "size": (176, 144)}
     path = write_clip(tmp_path / f"clip.{suffix}", count=30, **spec)
     assert read(path) == ([number / rate for number in range(30)], rate, 30 / rate)
+    assert read(path, 10)[1] == 10
     assert warnings() == []
+    clip = write_clip(tmp_path / "clip.mp4", count=2)
     with pytest.raises(VideoError, match="has a frame rate of its own; remove input"):
-        read(path, 10)
+        read(clip, 10)
 
 
 @pytest.mark.parametrize(
     ("given", "rate"), [(None, Fraction(25)), (12.5, SLOW), (50, Fraction(50))]
 )
-def test_a_stream_without_a_rate_has_that_of_the_settings(
-    given: float | None, rate: Fraction, tmp_path: Path, warnings: Callable[[], list[str]]
+@pytest.mark.parametrize(
+    ("suffix", "spec"),
+    [
+        ("mjpeg", {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": SLOW}),
+        *(
+            ("h264", {"codec": "libx264", "rate": unit})
+            for unit in map(Fraction, ("600", "1000", "1/25"))
+        ),
+    ],
+)
+def test_a_stream_without_a_usual_rate_has_that_of_the_settings(
+    suffix: str,
+    spec: dict[str, Any],
+    given: float | None,
+    rate: Fraction,
+    tmp_path: Path,
+    warnings: Callable[[], list[str]],
 ) -> None:
-    spec: dict[str, Any] = {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": SLOW}
-    path = write_clip(tmp_path / "clip.mjpeg", count=30, **spec)
+    path = write_clip(tmp_path / f"clip.{suffix}", count=30, **spec)
     assert read(path, given) == ([number / rate for number in range(30)], rate, 30 / rate)
     assumed = f"{path}: 25 frames per second are assumed; set input.frame_rate"
     assert warnings() == [assumed] * (given is None)

@@ -33,6 +33,20 @@ def cut_off(path: Path, fraction: float) -> Path:
     return path
 
 
+def fragments(path: Path, first: int, **spec: Any) -> Path:
+    """Write a fragmented clip without the fragments before `first`, of ten frames each."""
+    write_clip(path, movflags="+frag_keyframe+empty_moov+default_base_moof", **GOPS, **spec)
+    data, boxes, at = path.read_bytes(), list[tuple[bytes, bytes]](), 0
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at : at + 8])
+        boxes.append((kind, data[at : at + size]))
+        at += size
+    media = [box for kind, box in boxes if kind in (b"moof", b"mdat")]
+    head = [box for kind, box in boxes if kind in (b"ftyp", b"moov")]
+    path.write_bytes(b"".join([*head, *media[2 * first :]]))
+    return path
+
+
 def write_transparent(path: Path, codec: str) -> Path:
     """Write twelve frames whose transparency is noise."""
     rng = np.random.default_rng(0)
@@ -337,3 +351,18 @@ def clock_times(*stamps: int | None) -> list[Fraction]:
 @given(st.lists(st.none() | st.integers(-(2**40), 2**40)))
 def test_times_always_increase(stamps: list[int | None]) -> None:
     assert all(earlier < later for earlier, later in pairwise(clock_times(*stamps)))
+
+
+@pytest.mark.parametrize("first", [0, 3])
+@pytest.mark.parametrize("sounds", [[], ["aac"]])
+def test_fragments_end_where_their_last_frame_does(
+    tmp_path: Path, first: int, sounds: list[str], warnings: Warnings
+) -> None:
+    path = fragments(tmp_path / "a.mp4", first, sounds=sounds)
+    seconds = 60 * PERIOD - first * 10 * PERIOD
+    with VideoReader(path) as reader:
+        assert reader.length == seconds
+        assert reader.info.frames == 60 - 10 * first
+        assert [read_number(frame.image) for frame in reader] == list(range(10 * first, 60))
+        assert reader.length == seconds
+    assert warnings() == []

@@ -156,8 +156,8 @@ class InputSettings(Section):
     begin: str | None = Field(None, max_length=100)
     """Start time of the video, such as '2026-05-01 07:00+02:00'. null: from camera.clock."""
     frame_rate: float | None = Field(None, ge=0.01, le=1000)
-    """Frames per second of numbered images (img_%04d.png) and of raw streams (.264, .mjpeg) without
-    a rate of their own. null: 25, with a warning.
+    """Frames per second of numbered images (img_%04d.png) and of raw streams (.264, .mjpeg). null:
+    that of the stream, else 25, with a warning.
     """
 
     @field_validator("begin")

@@ -75,7 +75,8 @@ def is_pipe(path: Path) -> bool:
 
 HDR_TRANSFERS = (16, 18)
 """PQ and HLG, in codes of ITU-T H.273."""
-_MAX_RATE = 1000  # frames per second; in a raw stream, a larger number is the unit of its clock
+_RATES = 1, 240
+"""Usual frames per second; another number in a raw stream is the unit of its clock."""
 _EXPORTER = re.compile(r"Lav[fc]|HandBrake|Adobe|Blackmagic|DaVinci|VLC|vlc|iMovie|Final Cut")
 """Start of the name of a program that encodes videos again, or copies them."""
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
@@ -153,8 +154,12 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
     """Return the declared time from the first frame to the end of the stream, seconds.
 
     None if it is not declared. `start` is the time of the first frame. In MP4, hidden frames may
-    precede it. Matroska declares the end in a tag.
+    precede it, and fragments declare the end, in times of decoding. Matroska declares the end in a
+    tag.
     """
+    is_fragmented = "mp4" in stream.container.format.name and not stream.frames
+    if stream.duration and is_fragmented and stream.index_entries:
+        return (stream.duration - stream.index_entries[0].timestamp) * time_base_of(stream)
     if stream.duration:
         return ((stream.start_time or 0) + stream.duration) * time_base_of(stream) - start
     with suppress(KeyError, ValueError, ZeroDivisionError):
@@ -166,11 +171,11 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
 def _stated_rate(stream: VideoStream, *, is_raw: bool) -> Fraction | None:
     """Return the frame rate that a file declares, on average; None if it does not.
 
-    FFmpeg's average of a raw stream is an assumption.
+    FFmpeg's average of a raw stream is an assumption. What that declares may be its unit of time.
     """
     if is_raw:
         declared = stream.codec_context.framerate
-        return declared if declared and declared <= _MAX_RATE else None
+        return declared if declared and _RATES[0] <= declared <= _RATES[1] else None
     rate = stream.average_rate or stream.guessed_rate
     return (rate and rate.limit_denominator(_MAX_TERM)) or None
 
@@ -194,7 +199,7 @@ class Demuxer:
 
     If its clock restarts, each stream enters the next part where its own clock jumps, because
     packets of both parts alternate near the joint. The first stream in a part determines its
-    offset. `frame_rate` is that of numbered images, or of a raw stream which declares none.
+    offset. `frame_rate` is that of numbered images or of a raw stream, in place of what that says.
 
     Attributes
     ----------
@@ -207,7 +212,7 @@ class Demuxer:
     is_raw
         Whether packets have no times, as in a raw stream.
     has_own_rate
-        Whether the file declares its frame rate, or has times.
+        Whether the file declares its frame rate, or has times; False if `frame_rate` replaces it.
     rate
         Frames per second; `ASSUMED_RATE` if it is unknown.
     may_restart
@@ -235,7 +240,9 @@ class Demuxer:
         self.restarts = 0
         self.may_restart = bool(self.container.format.flags & _TS_DISCONT)
         self.is_raw = not self.images and bool(self.container.format.flags & _NO_TIMES)
-        stated = _stated_rate(self.video, is_raw=self.is_raw)
+        stated = None
+        if not (self.is_raw and frame_rate):
+            stated = _stated_rate(self.video, is_raw=self.is_raw)
         self.has_own_rate = not self.images and (stated is not None or not self.is_raw)
         self.rate = stated or (assumed if self.is_raw else ASSUMED_RATE)
         self._period = 1 / self.rate
