@@ -55,6 +55,42 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
         assert "rate: changes nothing, because the tracks have times; remove it" in result.err
 
 
+def test_regions_hold_for_saved_tracks_and_settings_of_the_search_are_refused(
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
+    tracks, far = tmp_path / "t.jsonl", tmp_path / "far.yaml"
+    clip, lines = folder / "red.mp4", ("-c", folder / "lines.yaml")
+    run("detect-video", clip, "--no-video", "--tracks", tracks, *red, code=0)
+    shapes = "[{name: right, points: [[0.4, 0], [1, 0], [1, 1], [0.4, 1]]}]"
+    far.write_text(f"regions: {shapes}\ndetector: {{min_score: 0.5}}\n")
+    for number, chosen in enumerate([("--set", f"regions={shapes}"), ("-c", far), ()]):
+        live, again = tmp_path / f"live{number}.csv", tmp_path / f"again{number}.csv"
+        wanted = ("--no-video", "--counts", live, *red, *lines)
+        run("detect-video", clip, *wanted, *chosen[: 2 * (number != 1)], code=0)
+        run("count", tracks, *lines, *chosen, "--counts", again, code=0)
+        if number != 1:
+            assert events_of(again) == events_of(live)
+    once, by_file, every = (events_of(tmp_path / f"again{number}.csv") for number in range(3))
+    assert once == by_file
+    assert ("gate" in {event[1] for event in once}, len(every)) == (False, 3)
+    for change in ("detector.min_score=0.5", "tracker={kind: rules}"):
+        result = run("count", tracks, *lines, "--set", change, code=2)
+        assert f"--set {change}: changes nothing in saved tracks; remove it" in result.err
+
+
+def test_people_in_tracks_of_another_tool_are_counted_only_if_chosen(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    tracks, lines = tmp_path / "t.csv", ("-c", folder / "lines.yaml")
+    rows = [f"{n},{n / 25},1,{4 * n},100,40,40,Pedestrian\n" for n in range(50)]
+    tracks.write_text("frame,time,id,x,y,width,height,class\n" + "".join(rows))
+    for chosen, count in ((), 0), (("--class", "person"), 1):
+        counts = tmp_path / f"{count}.csv"
+        result = run("count", tracks, *lines, *chosen, "--counts", counts, code=0)
+        assert len([row for row in rows_of(counts) if row["name"] == "gate"]) == count
+        assert ("people are not counted; to count them, use --class" in result.err) == (not count)
+
+
 @pytest.mark.parametrize("form", ["jsonl", "coco.json"])
 def test_tracks_of_a_video_whose_name_is_not_utf8_can_be_counted(
     run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...], form: str

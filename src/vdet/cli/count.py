@@ -72,6 +72,7 @@ def count(
 
     if len(tracks) > 1:  # by a pattern such as found/*.jsonl
         tracks = tuple(path for path in tracks if path.name != MANIFEST)
+    source.check_for_tracks()
     settings = source.load()
     if classes:  # any class that TRACKS have
         settings = settings.model_copy(update={"classes": standard_classes(classes)})

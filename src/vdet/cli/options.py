@@ -162,6 +162,10 @@ _assignments_option = click.option(
 )
 
 
+_OF_SEARCHES = "detector", "tracker", "steps", "lanes", "train", "labels", "clips", "draw"
+"""Sections of settings that only runs use."""
+
+
 @dataclass(frozen=True, slots=True)
 class SettingsSource:
     """Where the settings of a command come from; later ones win.
@@ -197,6 +201,14 @@ class SettingsSource:
         from vdet.run.inputs import input_files
 
         return input_files(*paths, *self.files, settings=settings)
+
+    def check_for_tracks(self) -> None:
+        """Raise `click.UsageError` if `--set` changes a section that saved tracks do not need."""
+        for change in self.changes:
+            if re.split("[.=]", change.strip())[0] in _OF_SEARCHES:
+                raise click.UsageError(
+                    f"--set {change}: changes nothing in saved tracks; remove it"
+                )
 
     def load(self, *, detector: str | None = None) -> "Settings":
         """Read the settings; arguments and errors as for `load_settings`."""

@@ -40,6 +40,7 @@ def review(
     from vdet.run.review import write_saved_review
     from vdet.run.video import Run
 
+    source.check_for_tracks()
     settings = source.load()
     if not settings.traffic:
         raise click.UsageError("no lines or zones to review; add a settings file with -c FILE")

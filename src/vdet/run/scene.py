@@ -18,7 +18,6 @@ from vdet.media.reader import VideoReader
 from vdet.progress import Progress
 from vdet.regions import Regions
 from vdet.run.result import findings_in
-from vdet.run.steps import tracks_inside
 from vdet.run.video import Run, log, open_video
 from vdet.track.track import FrameTracks
 
@@ -124,7 +123,7 @@ def saved_frames(tracks: Path, run: Run, size: Size, video: VideoInfo | None = N
     end = math.inf if run.end is None else origin + float(run.end)
     regions = Regions(run.settings.regions, *size)
     frames = [
-        replace(frame, tracks=tracks_inside(regions, frame.tracks))
+        replace(frame, tracks=regions.inside(frame.tracks))
         for frame in saved
         if start <= frame.time < end
     ]

@@ -149,13 +149,8 @@ class RegionStep:
         """Keep the detections and vehicles whose foot is inside the regions."""
         contains, detections = self._regions.contains, result.detections
         rows = [row for row, item in enumerate(detections) if contains(item.box.foot)]
-        tracks = tracks_inside(self._regions, result.tracks)
+        tracks = self._regions.inside(result.tracks)
         return replace(result, detections=detections[rows], tracks=tracks)
-
-
-def tracks_inside(regions: Regions, tracks: Sequence[Track]) -> tuple[Track, ...]:
-    """Return the vehicles whose foot is inside the regions."""
-    return tuple(track for track in tracks if regions.contains(track.foot))
 
 
 class ConditionStep:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, timedelta
 from pathlib import Path
 
+from vdet.config.classes import standard_class
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
 from vdet.findings import Finding, at_places, without
@@ -15,6 +16,7 @@ from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_head, read_tracks
 from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
+from vdet.regions import Regions
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import SEAM, Clock, Span, find_clock
 from vdet.traffic.corrections import Corrections, apply_corrections, by_video
@@ -55,7 +57,8 @@ def count_files(
     Files are put in the order of their clocks, or without any in that of the numbers in their
     names. Where clocks, or `input.begin`, say that one follows another, a vehicle in both is one
     vehicle. Frames that the next file shows again, by its vehicles, count once, with a warning
-    (logger "vdet"). Files without a clock are counted on their own, after the others.
+    (logger "vdet"). Files without a clock are counted on their own, after the others. Regions hold
+    as in a run; people count only in tracks of vdet, or if the settings choose them.
 
     Parameters
     ----------
@@ -95,6 +98,8 @@ def count_files(
         clock = clock_of_head
         if len(order) == 1:
             clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
+        if not (saved.video or settings.classes):
+            saved = _without_people(path, saved, settings)
         names[str(path)] = saved.video.name if saved.video else None
         recording.add(path, saved, clock, _frame_size(settings, size or saved.size))
         advance(1)
@@ -102,6 +107,17 @@ def count_files(
         raise ConfigError("rate: changes nothing, because the tracks have times; remove it")
     reviews = by_video(corrections, names, settings.traffic)
     return apply_corrections(recording.counts(), reviews, settings.classes)
+
+
+def _without_people(path: Path, saved: SavedTracks, settings: Settings) -> SavedTracks:
+    """Return the tracks of another tool without people, with a warning, as a run has none."""
+    names = {label.name for label in saved.labels}
+    people = {name for name in names if name and standard_class(name) == "person"}
+    if not people or "person" in settings.detector.vehicle_classes:
+        return saved
+    _log.warning("%s: people are not counted; to count them, use --class person", path)
+    labels = tuple(label for label in saved.labels if label.name not in people)
+    return replace(saved, labels=labels)
 
 
 def count_frames(
@@ -288,6 +304,7 @@ class _Group:
     def __init__(self, settings: Settings, size: tuple[int, int], started: int = 0) -> None:
         self.size, self._ignored = size, settings.conditions.ignore
         self._ground = ground_of(settings.camera, *size)
+        self._regions = Regions(settings.regions, *size) if settings.regions else None
         self.counter = VehicleCounter(settings, *size, started)
         self._videos: list[_Video] = []
 
@@ -312,10 +329,11 @@ class _Group:
                 step = (frame.time - latest.time) / max(1, frame.index - latest.index)
             latest = frame
             if frame.time >= video.start:
+                tracks = self._regions.inside(frame.tracks) if self._regions else frame.tracks
                 index, time = frame.index + video.frame_shift, frame.time + video.shift
-                self.counter.update(FrameTracks(index, time, frame.tracks))
+                self.counter.update(FrameTracks(index, time, tracks))
                 if video.meter:
-                    video.meter.add(frame)
+                    video.meter.add(replace(frame, tracks=tracks))
         video.last = round(latest.time, 6) if latest else video.first
         video.end = max(video.start, video.last + min(step, _LONGEST_STEP))
         video.next_shift = video.frame_shift + (latest.index + 1 if latest else 0)
