@@ -100,7 +100,7 @@ def _labels(frames: Sequence[vdet.Boxes]) -> SavedTracks:
     return SavedTracks(
         tuple(
             Label(0, astuple(box.box), frame=number, id=box.id or 0, score=box.score)
-            for number, boxes in enumerate(frames, start=1)
+            for number, boxes in enumerate(frames)
             for box in boxes
         )
     )

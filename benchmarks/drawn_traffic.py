@@ -121,7 +121,7 @@ def true_labels(scene: Scene, indices: Iterable[int]) -> SavedTracks:
 
 
 def _label(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
-    return Label(0, astuple(box), frame=index + 1, id=number, ignored=ignored)
+    return Label(0, astuple(box), frame=index, id=number, ignored=ignored)
 
 
 @dataclass(frozen=True, slots=True)

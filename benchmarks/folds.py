@@ -117,9 +117,9 @@ def main() -> None:
     options = parser.parse_args()
     truth = read_truth(options.truth)
     settings = load_settings((), SETTINGS, detector="svm")
-    models = _models(options.patches, truth.last_frame, settings)
+    models = _models(options.patches, truth.length, settings)
     limit_library_threads()
-    searched = _search(options.video, truth.last_frame, models, settings)
+    searched = _search(options.video, truth.length, models, settings)
     for key, values in SWEEPS.items():
         print("\n".join(_sweep(key, values, searched, models[0], truth)), flush=True)
 
@@ -204,10 +204,10 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
 
 
 def _f1_by_block(found: SavedTracks, truth: SavedTracks) -> list[float]:
-    last = truth.last_frame
+    last = truth.length
 
     def part(tracks: SavedTracks, block: int) -> SavedTracks:
-        blocks = _block_of(np.array([label.frame for label in tracks.labels]), last)
+        blocks = _block_of(np.array([label.frame + 1 for label in tracks.labels]), last)
         return replace(tracks, labels=tuple(compress(tracks.labels, blocks == block)))
 
     return [score(part(found, block), part(truth, block)).f1 for block in range(BLOCKS)]

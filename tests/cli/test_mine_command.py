@@ -98,7 +98,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
         expected = cv2.resize(crop, (64, 64), interpolation=cv2.INTER_LINEAR)
         np.testing.assert_array_equal(image, expected)
         if file.sides is not None:
-            corners = boxes_of(label for label in labels[number] if not label.ignored)
+            corners = boxes_of(label for label in labels[number - 1] if not label.ignored)
             middle = np.array([x, y, x, y]) + side / 2
             told = np.array(file.sides, float) * side + middle
             misses = np.nanmax(abs(corners - told), axis=1)

@@ -3,7 +3,7 @@
 from labels.saving import checked_video, row
 from vdet.labels.label import Label, SavedTracks
 
-TEN = range(1, 11)
+TEN = range(10)
 
 
 def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Label]:

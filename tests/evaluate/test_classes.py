@@ -34,7 +34,7 @@ def named(name: str, *tracks: list[Label]) -> list[Label]:
 def test_a_vehicle_of_a_video_has_the_last_class_of_the_track_that_finds_it_most() -> None:
     truth = video(named("Lorry", drive(7, TEN), drive(8, TEN, x=300), drive(9, TEN, x=600)))
     found = video(
-        named("car", drive(1, range(1, 4)), drive(3, TEN, x=900)),
+        named("car", drive(1, range(3)), drive(3, TEN, x=900)),
         named("car", drive(2, range(4, 8))),
         named("truck", drive(2, range(8, 11))),
         named("bus", drive(4, TEN, x=300)),

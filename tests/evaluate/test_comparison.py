@@ -44,7 +44,7 @@ def test_frames_with_nothing_that_counts_are_left_out() -> None:
 
 
 GOOD = compare(video(drive(1, TEN)), video(drive(1, TEN)))
-POOR = compare(video(drive(1, range(6, 11))), video(drive(1, TEN)))
+POOR = compare(video(drive(1, range(5, 10))), video(drive(1, TEN)))
 
 
 def test_the_same_id_in_two_videos_is_two_vehicles() -> None:

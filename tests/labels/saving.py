@@ -32,7 +32,7 @@ def row(
     score: float = 1.0,
     **known: Any,
 ) -> Label:
-    """Return a label by the number of its frame, its id and its size."""
+    """Return a label by the number of its frame, from 0, its id and its size."""
     box = from_size(x, y, width, height)
     return Label(place, box, frame=number, id=id_, score=score, **known)
 

@@ -43,7 +43,7 @@ def test_tracks_that_cvat_exports_are_read() -> None:
     assert saved.covered == (0, 5, 10)
     assert saved.size == (300, 200)
     assert [(row.frame, row.id, row.box) for row in saved.labels] == [
-        *((1, 7, (1, 1, 9, 9)), (11, 7, (1, 1, 9, 9)), (11, 8, (1, 1, 9, 9)))
+        *((0, 7, (1, 1, 9, 9)), (10, 7, (1, 1, 9, 9)), (10, 8, (1, 1, 9, 9)))
     ]
 
 

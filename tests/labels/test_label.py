@@ -12,10 +12,10 @@ from vdet.labels.parsing import numbered_lines
 
 
 def test_until_keeps_the_frames_up_to_the_last() -> None:
-    rows = [row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (2, 3, 5) for id_ in (1, 2)]
-    part = checked_video(rows).until(4)
-    assert [label.frame for label in part.labels] == [2, 2, 3, 3]
-    assert part.last_frame == 3
+    rows = [row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (1, 2, 4) for id_ in (1, 2)]
+    part = checked_video(rows).until(3)
+    assert [label.frame for label in part.labels] == [1, 1, 2, 2]
+    assert part.length == 3
 
 
 FILE = Path("gt.txt")
@@ -24,7 +24,7 @@ FILE = Path("gt.txt")
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (row(7, 0, 1, 0, 0, 5, 5), "the frame comes before the video's first"),
+        (row(7, -1, 1, 0, 0, 5, 5), "the frame comes before the video's first"),
         (row(7, 1, -1, 0, 0, 5, 5), "id -1 is negative"),
         (row(7, 1, -2, 0, 0, 5, 5, ignored=True), "id -2 is negative"),
         (row(7, 1, 3, 9, 9, 5, 5), "id 3 occurs twice in the same frame"),
@@ -47,13 +47,13 @@ def test_a_frame_may_have_many_ignore_regions_without_an_id() -> None:
 
 def test_words_for_a_class_become_ours_and_others_stay() -> None:
     labels = ("Van", "lorry", "tractor", None)
-    rows = [row(1, 1, number, 0, 0, 9, 9, name=label) for number, label in enumerate(labels)]
+    rows = [row(1, 0, number, 0, 0, 9, 9, name=label) for number, label in enumerate(labels)]
     names = [track.class_name for track in next(iter(SavedTracks(tuple(rows)))).tracks]
     assert names == ["car", "truck", "tractor", None]
 
 
 def test_a_rate_gives_times_to_frames_without() -> None:
-    saved = SavedTracks((row(1, 6, 1, 0, 0, 9, 9), row(1, 7, 1, 0, 0, 9, 9)), times={6: 0.5})
+    saved = SavedTracks((row(1, 5, 1, 0, 0, 9, 9), row(1, 6, 1, 0, 0, 9, 9)), times={6: 0.5})
     assert not saved.has_times
     assert math.isnan(next(iter(saved)).time)
     timed = saved.at_rate(10)

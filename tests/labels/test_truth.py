@@ -51,7 +51,7 @@ def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> No
     path.write_bytes(written(form, [frame(2, *tracks)]))
     labels = read_truth(path).labels
     assert [(label.frame, label.id, label.score) for label in labels] == [
-        *((3, 1, 1), (3, 2, 1), (3, 3, 1))
+        *((2, 1, 1), (2, 2, 1), (2, 3, 1))
     ]
     assert {label.box for label in labels} == {(10, 20, 40, 60)}
     assert [label.ignored for label in labels] == [False, False, True]
@@ -72,10 +72,10 @@ def test_only_frames_that_the_truth_is_about_are_compared(tmp_path: Path, name: 
     path = tmp_path / name
     path.write_text(STEPPED[name])
     truth = read_truth(path)
-    found = checked_video([row(0, n, 1, 1, 1, 8, 8) for n in range(1, 12) if n != 6])
+    found = checked_video([row(0, n, 1, 1, 1, 8, 8) for n in range(11) if n != 5])
     comparison = compare(found, truth)
-    assert [frame.number for frame in comparison.frames] == [1, 6, 11]
-    assert truth.spread(4, 1, 11) == {1, 6, 11}
+    assert [frame.number for frame in comparison.frames] == [0, 5, 10]
+    assert truth.spread(4, 0, 11) == {0, 5, 10}
 
 
 def test_what_is_found_after_the_last_vehicle_is_false(tmp_path: Path) -> None:
@@ -84,4 +84,4 @@ def test_what_is_found_after_the_last_vehicle_is_false(tmp_path: Path) -> None:
     found.write_text("".join(f"{n},1,2,2,8,8,1,-1,-1,-1\n" for n in (1, 6, 11)))
     result = score_files(found, path)
     assert (result.until, result.scores.false_positives, result.scores.vehicle_boxes) == (11, 2, 1)
-    assert read_truth(path).until(8).last_frame == 6
+    assert read_truth(path).until(8).length == 6

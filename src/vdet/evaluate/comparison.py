@@ -35,7 +35,7 @@ class ComparedFrame:
     Attributes
     ----------
     number
-        Number of the frame, from 1.
+        Number of the frame, from 0.
     vehicles, tracks
         int64 `(n,)` and `(m,)`: the true vehicle and the predicted track of each box, as indices
         into `vehicle_ids` and `track_ids` of the `Comparison`.
@@ -108,7 +108,7 @@ class Comparison:
 
 
 Frames = Mapping[int, Sequence[Label]]
-"""The labels of each frame by its number, from 1."""
+"""The labels of each frame by its number."""
 
 
 def compare(prediction: SavedTracks, truth: SavedTracks) -> Comparison:
@@ -136,7 +136,7 @@ def compare_frames(
     covered
         The frames that the truth covers, from 0; None: all.
     """
-    labelled = prediction.keys() if covered is None else {index + 1 for index in covered}
+    labelled = prediction.keys() if covered is None else set(covered)
     numbers = sorted((prediction.keys() & labelled) | truth.keys())
     counting = [_counting(prediction.get(n, ()), truth.get(n, ())) for n in numbers]
     vehicle_ids = _ids(vehicle for vehicles, _ in counting for vehicle in vehicles)

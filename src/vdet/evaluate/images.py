@@ -74,7 +74,7 @@ class MeasuredImage:
         ]
         detected = [label._replace(ignored=_width(label) < minimum) for label in detected]
         shown = list(compress(detected, boxes.reach(counting.score, counting.scores)))
-        every, counted = (compare_frames({1: labels}, {1: truth}) for labels in (detected, shown))
+        every, counted = (compare_frames({0: labels}, {0: truth}) for labels in (detected, shown))
         return cls(image, every, counted)
 
 

@@ -88,8 +88,8 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
     middles = {name: boxes[(len(boxes) - 1) // 2] for name, boxes in mistakes[:_MAX_CROPS]}
     numbers = {middle.frame.number for middle in middles.values()}
     tolerant = InputSettings(max_damaged=1)  # it was accepted when it was scored
-    with VideoReader(video, frames=max(numbers, default=1), settings=tolerant) as reader:
-        images = {frame.index + 1: frame.image for frame in reader if frame.index + 1 in numbers}
+    with VideoReader(video, frames=max(numbers, default=0) + 1, settings=tolerant) as reader:
+        images = {frame.index: frame.image for frame in reader if frame.index in numbers}
     for name, boxes in mistakes[:_MAX_CROPS]:
         middle = middles[name]
         image = images.get(middle.frame.number)
@@ -97,7 +97,7 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
             overlap = sum(box.overlap for box in boxes) / len(boxes)
             caption = f"{quantity(len(boxes), 'frame')}, best IoU {overlap:.2f}"
             tile = _cut_around(middle.box, _with_boxes(image, middle.frame))
-            yield Tile(tile, f"{name}, frame {middle.frame.number}", caption)
+            yield Tile(tile, f"{name}, frame {middle.frame.number + 1}", caption)
 
 
 def _cut_around(sides: Float64Array, image: Image) -> Image:

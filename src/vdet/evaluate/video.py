@@ -70,8 +70,8 @@ def score_files(
     for finding in warnings_in(tracks.findings):
         _log.warning("%s: %s", prediction, finding)
     truth = read_truth(truth_path, Roles.from_settings(settings))
-    last = until or truth.last_frame
-    return ClipResult(str(prediction), compare(tracks.until(last), truth.until(last)), last)
+    end = until or truth.length
+    return ClipResult(str(prediction), compare(tracks.until(end), truth.until(end)), end)
 
 
 def evaluate_video(
@@ -106,15 +106,15 @@ def evaluate_video(
         The truth covers frames beyond the end of the video.
     """
     all_classes = settings.model_copy(update={"classes": ()})
-    run = Run(video, settings=all_classes, frames=until or truth.last_frame or None)
+    run = Run(video, settings=all_classes, frames=until or truth.length or None)
     labels, frames = list[Label](), 0
     truth = truth.until(until) if until else truth
     with open_video(run, Parts(model), with_traffic=False) as opened:
         advance, info = progress("", opened.reader.expected), opened.reader.info
         for result in opened.results:
-            number = result.frame.index + 1
+            index = result.frame.index
             labels += [
-                Label(0, track.box.pixels, track.class_name, number, track.id, track.score)
+                Label(0, track.box.pixels, track.class_name, index, track.id, track.score)
                 for track in result.tracks
             ]
             frames += 1

@@ -150,7 +150,7 @@ class _Annotation:
     attributes: _Attributes | None = None
 
     def label(self, position: str, name: str, frame: int) -> Label:
-        """Return the box as a label of a frame, counted from 1; `NO_ID` without a track."""
+        """Return the box as a label of a frame; `NO_ID` without a track."""
         attributes = self.attributes or _Attributes()
         id_ = attributes.track_id if self.track_id is None else self.track_id
         x, y, width, height = self.bbox
@@ -230,7 +230,7 @@ def _read(path: Path, data: bytes) -> _Document:
 
 
 def _labels(path: Path, document: _Document, frames: Mapping[int, int]) -> Iterator[Label]:
-    """Yield the label of each annotation; `frames` are numbers from 1 by the id of the image.
+    """Yield the label of each annotation; `frames` are those of images by their ids.
 
     Raises `TruthError` if an image or a category is missing.
     """
@@ -254,7 +254,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     """
     document = _read(path, data)
     images = {image.frame: image for image in document.images if image.frame is not None}
-    frames = {image.id: (image.frame or 0) + 1 for image in document.images}
+    frames = {image.id: image.frame or 0 for image in document.images}
     labels = tuple(_labels(path, document, frames))
     if any(image.frame is None for image in document.images) or NO_ID in {
         label.id for label in labels
@@ -298,7 +298,7 @@ def read_coco_images(path: Path) -> Iterator[LabelledImage]:
     """
     document = _read(path, read_bytes(path))
     by_image: dict[int, list[Label]] = defaultdict(list)
-    labels = _labels(path, document, dict.fromkeys((image.id for image in document.images), 1))
+    labels = _labels(path, document, dict.fromkeys((image.id for image in document.images), 0))
     for entry, label in zip(document.annotations, labels, strict=True):
         by_image[entry.image_id].append(label)
     names = image_names(path, [image.file_name for image in document.images])

@@ -46,7 +46,7 @@ class Label(NamedTuple):
     name
         Its name in the file; None if the file has no names.
     frame
-        Number of the frame, from 1; 1 in an image.
+        Number of the frame, from 0; 0 in an image.
     score
         Confidence, higher is better; 1 where the file has none.
     ignored
@@ -58,7 +58,7 @@ class Label(NamedTuple):
     position: int | str
     box: Corners
     name: str | None = None
-    frame: int = 1
+    frame: int = 0
     id: int = NO_ID
     score: float = 1.0
     ignored: bool = False
@@ -97,7 +97,7 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
     for label in checked:
         mistake = mistake_in_box(label)
         key = label.frame, label.id
-        if label.frame < 1:
+        if label.frame < 0:
             mistake = "the frame comes before the video's first"
         elif label.id < (NO_ID if label.ignored else 0):
             mistake = f"id {label.id} is negative; number the vehicles from 0 or 1"
@@ -234,11 +234,11 @@ class SavedTracks:
         """
         frames = self.by_frame()
         for index in sorted(self._indices()):
-            labels = sorted(frames.get(index + 1, ()), key=attrgetter("id"))
+            labels = sorted(frames.get(index, ()), key=attrgetter("id"))
             yield FrameTracks(index, self.times.get(index, math.nan), tuple(map(_track, labels)))
 
     def by_frame(self) -> dict[int, list[Label]]:
-        """Return the labels by the number of their frame, from 1, ascending.
+        """Return the labels by the number of their frame, ascending.
 
         A name is one of `STANDARD_CLASSES` if it means one. The labels of a frame keep their order.
         """
@@ -254,35 +254,35 @@ class SavedTracks:
         return frames
 
     @property
-    def last_frame(self) -> int:
-        """Number of the last frame that is covered or has a box, from 1; 0 if there is none."""
+    def length(self) -> int:
+        """Number of frames up to the last that is covered or has a box."""
         return max(self._indices(), default=-1) + 1
 
-    def until(self, last: int) -> "SavedTracks":
-        """Return the frames 1 to `last`."""
-        labels = tuple(label for label in self.labels if label.frame <= last)
-        covered = None if self.covered is None else [at for at in self.covered if at < last]
+    def until(self, end: int) -> "SavedTracks":
+        """Return the frames before `end`."""
+        labels = tuple(label for label in self.labels if label.frame < end)
+        covered = None if self.covered is None else [at for at in self.covered if at < end]
         return replace(self, labels=labels, covered=covered)
 
-    def spread(self, every: int, first: int, last: int) -> set[int]:
-        """Return numbers of covered frames from `first` to `last`, each `every` or more apart."""
+    def spread(self, every: int, first: int, end: int) -> set[int]:
+        """Return covered frames from `first` until before `end`, each `every` or more apart."""
         chosen, earliest = set(), first
-        for index in range(last) if self.covered is None else self.covered:
-            if earliest <= index + 1 <= last:
-                chosen.add(index + 1)
-                earliest = index + 1 + every
+        for index in range(end) if self.covered is None else self.covered:
+            if earliest <= index < end:
+                chosen.add(index)
+                earliest = index + every
         return chosen
 
     def check_end(self, video: Path, frames: int) -> None:
         """Raise `TruthError` if there is a box beyond the last frame of the file `video`."""
-        last = max((label.frame for label in self.labels), default=0)
-        if last > frames:
+        count = max((label.frame + 1 for label in self.labels), default=0)
+        if count > frames:
             raise TruthError(
-                f"{video}: has {frames} frames, but its ground truth has a box in frame {last}"
+                f"{video}: has {frames} frames, but its ground truth has a box in frame {count}"
             )
 
     def _indices(self) -> set[int]:
-        return {label.frame - 1 for label in self.labels}.union(self.covered or ())
+        return {label.frame for label in self.labels}.union(self.covered or ())
 
 
 def _track(label: Label) -> Track:

@@ -67,12 +67,12 @@ class _Box:
     lane: _Whole | None = None
 
     def label(self, line: int, frame: int) -> Label:
-        """Return the box as a label of a frame, counted from 0."""
+        """Return the box as a label of a frame."""
         return Label(
             position=line,
             box=from_size(self.x, self.y, self.width, self.height),
             name=self.class_name,
-            frame=frame + 1,
+            frame=frame,
             id=self.id,
             score=1.0 if self.score is None else self.score,
             state=self.state or "detected",
@@ -337,7 +337,7 @@ def _mot_labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
         yield Label(
             position=line,
             box=from_size(row.left - 1, row.top - 1, row.width, row.height),
-            frame=row.frame,
+            frame=row.frame - 1,
             id=row.id,
             score=1.0 if is_truth else row.score,
             ignored=is_truth and row.score == 0,

@@ -396,6 +396,6 @@ def _gap(before: _Video, saved: SavedTracks, video: _Video, frames: SavedTracks)
 
 def _between(saved: SavedTracks, first: float, last: float) -> SavedTracks:
     """Return the frames from one time to another, seconds."""
-    labels = (label for label in saved.labels if first <= saved.times[label.frame - 1] <= last)
+    labels = (label for label in saved.labels if first <= saved.times[label.frame] <= last)
     covered = [index for index in saved.covered or () if first <= saved.times[index] <= last]
     return replace(saved, labels=tuple(labels), covered=covered)

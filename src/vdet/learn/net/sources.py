@@ -156,8 +156,7 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> NetSource:
     """
     roles = Roles.for_training(settings)
     saved = read_truth(truth, roles)
-    last = saved.last_frame
-    used = saved.spread(EVERY, EVERY, last)
+    used = saved.spread(EVERY, EVERY - 1, saved.length)
     labels: dict[int, list[Label]] = defaultdict(list)
     for label in saved.labels:
         if label.frame in used:
@@ -169,8 +168,8 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> NetSource:
     labelled = LabelledImages(video.name, (), ignored=dict(ignored.most_common()))
 
     def frames() -> _Frames:
-        with VideoReader(video, frames=last, settings=settings.input) as reader:
-            for number, frame in enumerate(reader, start=1):
+        with VideoReader(video, frames=saved.length, settings=settings.input) as reader:
+            for number, frame in enumerate(reader):
                 if number in used:
                     yield frame.image, LabelledImage(video, truth, tuple(labels[number]))
 

@@ -240,27 +240,27 @@ class VideoSource:
             The video cannot be read or searched.
         """
         truth = read_truth(self.truth, Roles.from_settings(settings))
-        last = min(self.last or truth.last_frame, truth.last_frame)
-        if last < self.first:
-            raise TruthError(f"{self.truth}: ends at frame {truth.last_frame}; begin earlier")
-        regular, labels_by_frame = truth.spread(self.every, self.first, last), truth.by_frame()
-        number = 0
-        with VideoReader(self.path, frames=last, settings=settings.input) as reader:
-            width, advance = reader.info.width, progress(self.path.name, last)
+        first, end = self.first - 1, min(self.last or truth.length, truth.length)
+        if end <= first:
+            raise TruthError(f"{self.truth}: ends at frame {truth.length}; begin earlier")
+        regular, labels_by_frame = truth.spread(self.every, first, end), truth.by_frame()
+        read = 0
+        with VideoReader(self.path, frames=end, settings=settings.input) as reader:
+            width, advance = reader.info.width, progress(self.path.name, end)
             images, frames = peek(reader)
             with named_errors(self.path, VideoError):
                 detector = model.for_video(width, reader.info.height, images)
             for frame in frames:
-                number = frame.index + 1
-                labels = labels_by_frame.get(number, [])
+                read = frame.index + 1
+                labels = labels_by_frame.get(frame.index, [])
                 cuts_off = any(_beside(box, width).any() for box in _vehicles(labels))
-                if number in regular or (number >= self.first and cuts_off):
+                if frame.index in regular or (frame.index >= first and cuts_off):
                     windows, _ = detector.search(Picture(frame.image), None)
                     rng = np.random.default_rng(frame.index)
                     yield frame, list(choose_windows(windows, labels, width, rng, limits=limits))
                 advance(1)
-        if number < last:
-            truth.check_end(self.path, number)
+        if read < end:
+            truth.check_end(self.path, read)
 
 
 def mine(
