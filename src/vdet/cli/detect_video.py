@@ -242,9 +242,11 @@ def _process_video(run: "Run") -> bool:
         announce(f"{run.source}: begins {totals.clock}")
     if totals.corrected:
         announce(f"{run.source}: {totals.corrected}")
-    findings = findings_in(totals.facts).items
-    announce_notes(run.source, findings)
-    return bool(warnings_in(findings))
+    findings = findings_in(totals.facts)
+    announce_notes(run.source, findings.items)
+    if findings.nothing_moved:
+        announce(f"{run.source}: no vehicle was found, and nothing moved")
+    return bool(warnings_in(findings.items))
 
 
 def _process_videos(

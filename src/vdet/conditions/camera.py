@@ -21,6 +21,10 @@ _POINTS, _MIN_POINTS = 80, 12
 """Number of corners to follow, and the minimum to lay a plane over another."""
 _AGREEING = 0.5
 """Fraction of the corners that must agree with a similarity."""
+_IN_PLACE = 0.75
+"""Minimum correlation of the edges of two planes of one view, where no similarity is found: it is
+0.8 to 1 before fixed cameras, also under clouds and by night, and 0.3 to 0.8 while driving.
+"""
 _ERROR = 0.3
 """Displacement within the error of measurement, pixels of a plane."""
 _RENEWED = 30.0
@@ -42,7 +46,7 @@ class CameraWatch:
         """Displacements of the corners of the frame since the start, `(4, 2)` each, fractions of
         the width: infinite in another view, NaN if unknown.
         """
-        self._still_planes = 0
+        self._still_planes = self._lost_planes = 0
         self._plane: Image | None = None
         self._points = np.empty((0, 1, 2), np.float32)
         self._reference = np.zeros((4, 2))
@@ -61,6 +65,7 @@ class CameraWatch:
         with np.errstate(invalid="ignore"):  # both may be other views
             is_steady = bool(np.abs(position - before).max() <= _LIMIT / 2)
         self._still_planes += is_steady
+        self._lost_planes += bool(np.isinf(position).any())
         self._times.append(time)
         self._positions.append(position)
         is_old = time - self._since > _RENEWED and np.isfinite(position).all()
@@ -79,6 +84,11 @@ class CameraWatch:
     def is_moving(self) -> bool:
         """Whether it moved in more than a tenth of the planes so far."""
         return self._still_planes < _STILL * len(self._times)
+
+    @property
+    def travels(self) -> bool:
+        """Whether it showed other views in more than a tenth of the planes so far."""
+        return self._lost_planes > (1 - _STILL) * len(self._times)
 
     def findings(self) -> list[Finding]:
         """Return when the camera moved, or when it was moved permanently."""
@@ -116,27 +126,36 @@ class CameraWatch:
         """
         if self._plane is None:
             return np.zeros((4, 2))
-        if len(self._points) < _MIN_POINTS:
-            return np.full((4, 2), np.nan)
-        tracked, status, _ = cv2.calcOpticalFlowPyrLK(
-            self._plane, plane, self._points, np.empty(0), winSize=(9, 9), maxLevel=2
-        )
-        seen = status.ravel() > 0
-        if seen.sum() >= _MIN_POINTS:
-            matrix, agreeing = cv2.estimateAffinePartial2D(
-                self._points[seen], tracked[seen], ransacReprojThreshold=0.7, maxIters=200
+        if len(self._points) >= _MIN_POINTS:
+            tracked, status, _ = cv2.calcOpticalFlowPyrLK(
+                self._plane, plane, self._points, np.empty(0), winSize=(9, 9), maxLevel=2
             )
-            if agreeing.sum() >= _AGREEING * len(seen):
-                height, width = plane.shape
-                corners = np.array([(0, 0), (width, 0), (0, height), (width, height)])
-                return np.asarray(corners @ matrix[:, :2].T + matrix[:, 2] - corners)
-        return np.full((4, 2), lost)
+            seen = status.ravel() > 0
+            if seen.sum() >= _MIN_POINTS:
+                matrix, agreeing = cv2.estimateAffinePartial2D(
+                    self._points[seen], tracked[seen], ransacReprojThreshold=0.7, maxIters=200
+                )
+                if agreeing.sum() >= _AGREEING * len(seen):
+                    height, width = plane.shape
+                    corners = np.array([(0, 0), (width, 0), (0, height), (width, height)])
+                    return np.asarray(corners @ matrix[:, :2].T + matrix[:, 2] - corners)
+        else:
+            lost = np.nan
+        with np.errstate(invalid="ignore"):  # a plane without edges
+            agreement = np.corrcoef(_edges(self._plane).ravel(), _edges(plane).ravel())[0, 1]
+        return np.full((4, 2), 0.0 if agreement >= _IN_PLACE else lost)
 
 
 def _distances(positions: Float64Array, usual: Float64Array) -> Float64Array:
     """Return the mean distance of the corners from the median of the usual positions, `(n,)`."""
     x, y = np.moveaxis(positions - np.median(usual, axis=0), -1, 0)
     return np.asarray(np.hypot(x, y).mean(axis=1))
+
+
+def _edges(plane: Image) -> Float32Array:
+    """Return the edges of a plane, limited, so that many weak ones count like a few strong ones."""
+    soft = cv2.GaussianBlur(plane.astype(np.float32), (0, 0), 1)
+    return np.asarray(np.clip(soft - cv2.GaussianBlur(soft, (0, 0), 3), -12, 12), np.float32)
 
 
 def _corners(plane: Image, boxes: Iterable[Box]) -> Float32Array:

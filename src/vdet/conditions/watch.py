@@ -36,7 +36,8 @@ class Conditions:
     def __init__(self, settings: Settings, width: int) -> None:
         self._settings = settings
         self._width = width
-        self._camera, self._motion, self._weak = CameraWatch(), MotionWatch(), WeakWatch()
+        lines = {line.name: (line.start, line.end) for line in settings.traffic.lines}
+        self._camera, self._motion, self._weak = CameraWatch(), MotionWatch(lines), WeakWatch()
         self._times: list[float] = []
         self._measures: list[Float64Array] = []
         self._wet: list[bool] = []
@@ -77,15 +78,18 @@ class Conditions:
             camera = self._camera.findings()
             has_places = settings.traffic or settings.regions or settings.camera.ground
             findings += at_places(camera) if has_places else camera
-            watch = self._motion if self._camera.is_still else self._weak
-            findings += watch.findings()
+            if self._camera.is_still:
+                findings += self._motion.findings()
+            elif self._camera.travels:
+                findings += self._weak.findings()
             is_shipped = detector.kind == "net" and detector.model is None
             wet = np.array(self._wet)
             findings += visibility.findings(times, measures, wet, is_shipped=is_shipped)
         chosen = without(findings, settings.conditions.ignore)
         facts = tuple(item for item in chosen if item.severity == "fact")
         items = tuple(item for item in chosen if item.severity != "fact")
-        return Findings(items, self._camera.is_still, facts)
+        is_still = self._camera.is_still
+        return Findings(items, is_still, facts, is_still and self._motion.nothing_moved)
 
 
 def planes_of(picture: Picture) -> tuple[Image, Image]:
