@@ -55,10 +55,10 @@ def room_of(module: str) -> str:
     return module.split(".", maxsplit=1)[0]
 
 
-def imports_of(path: Path, *, at_start: bool = False) -> Iterator[str]:
-    """Give the modules of vdet that a file imports; `at_start`: not those inside functions."""
+def imports_of(path: Path) -> Iterator[str]:
+    """Give the modules of vdet that a file imports, also inside functions."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in tree.body if at_start else ast.walk(tree):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (_without_vdet(alias.name) for alias in node.names if _of_vdet(alias.name))
         elif isinstance(node, ast.ImportFrom):
@@ -111,7 +111,7 @@ def test_nothing_imports_the_command_line() -> None:
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
-    graph = {name: set(imports_of(path, at_start=True)) - {name} for name, path in NAMES.items()}
+    graph = {name: set(imports_of(path)) - {name} for name, path in NAMES.items()}
     order = list(graphlib.TopologicalSorter(graph).static_order())  # CycleError names the circle
     assert len(order) == len(NAMES)
 

@@ -21,8 +21,9 @@ from vdet.run.loop import Parts
 from vdet.run.result import findings_in
 from vdet.run.video import Run, run_video
 from vdet.track.track import FrameTracks, Track
+from vdet.traffic.counts import Trace
 from vdet.traffic.strips import Band, Passages
-from vdet.traffic.traces import Trace, TraceSearch
+from vdet.traffic.traces import TraceSearch
 
 RATE = 12
 SAMPLES = 200

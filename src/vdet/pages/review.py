@@ -16,10 +16,9 @@ from vdet.config.shapes import TrafficSettings
 from vdet.findings import Finding
 from vdet.media import VideoInfo
 from vdet.pages.render import TEMPLATES, render
-from vdet.traffic.counts import Event, class_of
+from vdet.traffic.counts import Event, Trace, class_of
 from vdet.traffic.sample import draw_minutes, strata_of
 from vdet.traffic.strips import Band
-from vdet.traffic.traces import Trace
 
 PAGE_NAME = "review.html"
 _PICTURES = "<!-- pictures -->"

@@ -1,6 +1,6 @@
 """The result of one frame, and the facts that steps add to it."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import cv2
 
-from vdet.boxes import Boxes
+from vdet.boxes import Boxes, Image
 from vdet.config.classes import is_chosen
+from vdet.draw.boxes import color_of, draw_box
 from vdet.errors import ConfigError
 from vdet.findings import Findings
 from vdet.media import Frame
@@ -97,10 +98,14 @@ class FrameResult:
         rest = (track for track in self.tracks if not is_chosen(track.class_name, classes))
         return replace(self, tracks=chosen, unselected=tuple(rest)) if classes else self
 
+    def draw_tracks(self, image: Image, parts: Sequence[str]) -> None:
+        """Draw the boxes of the tracks, each in a colour of its own, with these parts of labels."""
+        for track in self.tracks:
+            text, is_dashed = track.label(parts), track.state == "predicted"
+            draw_box(image, track.box, color_of(track.id), text, dashed=is_dashed)
+
     def _repr_png_(self) -> bytes:
         """Return the frame with its vehicles, for notebooks."""
-        from vdet.run.sinks.drawn import draw_tracks
-
         image = self.frame.image.copy()
-        draw_tracks(image, self.tracks, ("id", "class"))
+        self.draw_tracks(image, ("id", "class"))
         return cv2.imencode(".png", image)[1].tobytes()

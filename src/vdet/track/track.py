@@ -1,6 +1,6 @@
 """The protocol of all trackers, and the vehicles they show in a frame."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 from typing import Any, Literal, Protocol, runtime_checkable
 
@@ -62,6 +62,12 @@ class Track:
         """`foot` as written to files, to a hundredth of a pixel."""
         x, y = self.whole_foot or self.box.foot
         return round(100 * x) / 100, round(100 * y) / 100  # round(x, 2) is three times slower
+
+    def label(self, parts: Sequence[str]) -> str:
+        """Return the text of a label: those of the parts id, class, score, distance it has."""
+        texts = {"id": f"#{self.id}", "class": self.class_name, "score": f"{self.score:.2f}"}
+        texts["distance"] = None if self.distance is None else f"{self.distance:.0f} m"
+        return " ".join(text for part in parts if (text := texts[part]))
 
 
 @dataclass(frozen=True, slots=True)

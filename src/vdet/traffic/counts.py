@@ -19,8 +19,6 @@ from vdet.traffic.estimate import Estimate
 if TYPE_CHECKING:
     import pandas as pd
 
-    from vdet.traffic.traces import Trace
-
 Direction = tuple[str, str]
 """Name of a line or zone, and of a direction."""
 
@@ -209,6 +207,24 @@ class Corrected:
 
 
 @dataclass(frozen=True, slots=True)
+class Trace:
+    """Something that passed a band like a vehicle, without a track.
+
+    Attributes
+    ----------
+    band, name
+        Number of the band from 0, and name of its line or zone.
+    time, position
+        Seconds in the video, and fraction of the length of the band, 0 to 1.
+    """
+
+    band: int
+    name: str
+    time: float
+    position: float
+
+
+@dataclass(frozen=True, slots=True)
 class Counts:
     """All results of one video.
 
@@ -242,7 +258,7 @@ class Counts:
     clock: Clock | None = None
     findings: tuple[Finding, ...] = ()
     corrected: Corrected | None = None
-    traces: "tuple[Trace, ...]" = ()
+    traces: tuple[Trace, ...] = ()
     outside_flows: tuple[str, ...] = ()
     classes: tuple[str, ...] = ()
 

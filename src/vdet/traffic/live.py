@@ -11,13 +11,12 @@ from vdet.lanes.ground import ground_of
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import Counts
+from vdet.traffic.counts import Counts, Trace
 from vdet.traffic.records import VehicleRecord, VehicleRecords
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 if TYPE_CHECKING:
     from vdet.traffic.corrections import Corrections
-    from vdet.traffic.traces import Trace
 
 
 class LiveTraffic:
@@ -77,7 +76,7 @@ class LiveTraffic:
             return self._final
         return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
 
-    def add_traces(self, traces: "Sequence[Trace]") -> None:
+    def add_traces(self, traces: Sequence[Trace]) -> None:
         """Add what passed without a track to the counts, with its findings, after `end`."""
         from vdet.traffic.traces import trace_findings  # most runs have no strips
 

@@ -301,13 +301,16 @@ class BestCrops:
     """Finds the best image of each vehicle, frame by frame.
 
     Only images of vehicles in the last frame are kept in memory. The others are returned, so memory
-    does not grow with the length of the video. `is_coarse` is `output.coarse`.
+    does not grow with the length of the video. `is_coarse` is `output.coarse`. Several sinks may
+    add the same frames.
     """
 
     def __init__(self, *, is_coarse: bool = False) -> None:
         self._is_coarse = is_coarse
         self._best: dict[int, Callable[[], Crop]] = {}
         self._merits: dict[int, _Merit] = {}
+        self._latest: FrameTracks | None = None
+        self._gone: list[Crop] = []
 
     def add(self, frame: FrameTracks, picture: Picture) -> list[Crop]:
         """Add the next frame.
@@ -317,15 +320,18 @@ class BestCrops:
         The best images so far of the vehicles that this frame no longer shows. If a vehicle
         reappears and gets a better image, it is returned again.
         """
+        if frame is self._latest:
+            return self._gone
         shown = {track.id for track in frame.tracks}
-        gone = [self._best.pop(number)() for number in sorted(self._best.keys() - shown)]
+        self._latest = frame
+        self._gone = [self._best.pop(number)() for number in sorted(self._best.keys() - shown)]
         for track in frame.tracks:
             merit = _merit(track, picture)
             if merit and merit > self._merits.get(track.id, (False, 0.0)):
                 self._merits[track.id] = merit
                 part = picture.deferred_crop(_padded(track.box.rounded))
                 self._best[track.id] = partial(self._crop, track, frame.time, part)
-        return gone
+        return self._gone
 
     def end(self) -> list[Crop]:
         """Return the images of the vehicles that the last frame shows."""

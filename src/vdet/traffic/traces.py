@@ -17,7 +17,7 @@ from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.errors import clock_text, quantity
 from vdet.findings import Finding
 from vdet.track.track import FrameTracks
-from vdet.traffic.counts import Counts
+from vdet.traffic.counts import Counts, Trace
 from vdet.traffic.strips import Band, Passage
 
 _SAMPLES = 64
@@ -46,24 +46,6 @@ _MANY = 0.05
 """Maximum number of traces for a note instead of a warning, as a fraction of the vehicles."""
 _INTERVAL = 300
 """Seconds of the intervals in which traces are counted."""
-
-
-@dataclass(frozen=True, slots=True)
-class Trace:
-    """Something that passed a band like a vehicle, without a track.
-
-    Attributes
-    ----------
-    band, name
-        Number of the band from 0, and name of its line or zone.
-    time, position
-        Seconds in the video, and fraction of the length of the band, 0 to 1.
-    """
-
-    band: int
-    name: str
-    time: float
-    position: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,11 +26,9 @@ from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.result import FrameResult, findings_in
-from vdet.run.sinks.poster import Poster
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output
 from vdet.traffic.records import join_records, records_content
-from vdet.traffic.survey import Survey
 from vdet.traffic.tables import SUFFIXES, check_table, write_content
 from vdet.traffic.workbook import write_workbook
 from vdet.version import __version__
@@ -216,21 +214,19 @@ class WorkbookSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._image = survey_image(context.settings)
-        self._poster = Poster(is_coarse=context.settings.output.coarse)
 
     def write(self, result: FrameResult) -> None:
         """Look for more vehicles."""
-        self._poster.add(result)
+        self.context.poster.add(result)
 
     def finish(self) -> None:
         """Write the file."""
-        settings, counts = self.context.settings, self.traffic.counts()
-        assert counts
-        image = self._poster.image(self.traffic.vehicles) if self._image is None else self._image
+        survey, vehicles, image = self.context.survey, self.traffic.vehicles, self._image
+        image = self.context.poster.image(vehicles) if image is None else image
+        assert survey  # the settings have lines or zones
         assert image is not None  # a run has frames
-        paths = {vehicle.id: vehicle.path for vehicle in self.traffic.vehicles}
-        picture = scene_picture(image, settings.traffic, [counts], paths)
-        survey = Survey({self.video.name: counts}, settings)
+        paths = {vehicle.id: vehicle.path for vehicle in vehicles}
+        picture = scene_picture(image, survey.settings.traffic, survey.counts, paths)
         write_workbook(self.context.files.stage(self.path), survey.sheets(picture))
 
 
@@ -247,9 +243,9 @@ def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> BaseSink
         return WorkbookSink(path, context)
 
     def content(sink: TableSink) -> Any:
-        counts = sink.traffic.counts()
-        assert counts  # the settings have lines or zones
-        return make(path, {sink.video.name: counts}, traffic.seconds)
+        survey = sink.context.survey
+        assert survey  # the settings have lines or zones
+        return make(path, survey.videos, traffic.seconds)
 
     return TableSink(content, path, context)
 

@@ -4,7 +4,6 @@ import zlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self
 
-from vdet.boxes import Image
 from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.schema import Settings
 from vdet.draw import boxes
@@ -82,7 +81,7 @@ class Overlay:
         colors = [self._color(track) for track in shown]
         for track, color in zip(shown, colors, strict=True):
             boxes.draw_box(surface, track.box, color, dashed=track.state == "predicted")
-        texts = [[label_text(track, parts) for parts in self._labels] for track in shown]
+        texts = [[track.label(parts) for parts in self._labels] for track in shown]
         boxes.draw_labels(surface, [track.box for track in shown], texts, colors)
 
     def _color(self, track: Track) -> Color:
@@ -90,20 +89,6 @@ class Overlay:
             return boxes.GREEN
         number = track.id if self._draw.colors == "id" else _class_number(track.class_name)
         return boxes.color_of(number) if number else boxes.WHITE
-
-
-def label_text(track: Track, parts: Sequence[str]) -> str:
-    """Return the text of a label: the parts that are known."""
-    texts = {"id": f"#{track.id}", "class": track.class_name, "score": f"{track.score:.2f}"}
-    texts["distance"] = None if track.distance is None else f"{track.distance:.0f} m"
-    return " ".join(text for part in parts if (text := texts[part]))
-
-
-def draw_tracks(image: Image, tracks: Sequence[Track], parts: Sequence[str]) -> None:
-    """Draw the boxes of tracks, BGR, each in a colour of its own, with these parts of a label."""
-    for track in tracks:
-        text, is_dashed = label_text(track, parts), track.state == "predicted"
-        boxes.draw_box(image, track.box, boxes.color_of(track.id), text, dashed=is_dashed)
 
 
 def _class_number(name: str | None) -> int:

@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -24,13 +24,11 @@ from vdet.pages.review import PAGE_NAME as REVIEW_NAME
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import Regions
 from vdet.run.result import FrameResult, findings_in
-from vdet.run.sinks.drawn import IMAGE_LABELS, draw_tracks
-from vdet.run.sinks.poster import Poster
+from vdet.run.sinks.drawn import IMAGE_LABELS
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.clock import Clock, Span, extend
 from vdet.traffic.live import LiveTraffic
-from vdet.traffic.records import BestCrops, Crop, VehicleRecord
-from vdet.traffic.survey import Survey
+from vdet.traffic.records import Crop, VehicleRecord
 
 log = logging.getLogger("vdet")
 
@@ -79,7 +77,7 @@ def _with_boxes(result: FrameResult) -> Image:
     for detection in detections:
         draw_box(picture, detection.box, WHITE)
         draw_label(picture, f"{detection.score:.2f}", (detection.box.x1, detection.box.y2), WHITE)
-    draw_tracks(picture, result.tracks, IMAGE_LABELS[-1])
+    result.draw_tracks(picture, IMAGE_LABELS[-1])
     return picture
 
 
@@ -92,22 +90,23 @@ class CropSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _is_crop)
-        self._crops = BestCrops(is_coarse=context.settings.output.coarse)
         self._written: dict[int, tuple[float, Path]] = {}
 
     def finish(self) -> None:
         """Write the images of vehicles still shown, and name those of all recorded vehicles."""
-        self._write_all(self._crops.end())
+        self._write_all(self.context.crops.end())
         for vehicle in self.traffic.vehicles:
             if vehicle.id in self._written:
                 time, path = self._written.pop(vehicle.id)
-                path.rename(self._folder / _crop_name(vehicle, time))
+                name = _crop_name(vehicle, time)
+                path.rename(self._folder / name)
+                self.context.crop_files[vehicle.id] = self.path / name
         for _, path in self._written.values():
             path.unlink()
 
     def write(self, result: FrameResult) -> None:
         """Look for better images in a frame."""
-        self._write_all(self._crops.add(result.frame_tracks, result.frame.picture))
+        self._write_all(self.context.crops.add(result.frame_tracks, result.frame.picture))
 
     def _write_all(self, crops: list[Crop]) -> None:
         for crop in crops:
@@ -141,15 +140,13 @@ class PageSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._file = context.files.stage_folder(path) / PAGE_NAME
-        self._crops = BestCrops(is_coarse=context.settings.output.coarse)
         self._thumbnails: dict[int, tuple[float, str]] = {}
         self._spans: list[Span] = []
-        self._poster = Poster(is_coarse=context.settings.output.coarse)
         self._frames = 0
 
     def finish(self) -> None:
         """Write the page."""
-        self._keep(self._crops.end())
+        self._keep(self.context.crops.end())
         page = self._page()
         self.summary = {"page": f"{self.path.name}/{PAGE_NAME}", **page.facts.model_dump()}
         write_text(self._file, page.html())
@@ -159,31 +156,30 @@ class PageSink(BaseSink):
         frame, picture = result.frame_tracks, result.frame.picture
         extend(self._spans, frame.time, _GAP)
         self._frames += 1
-        self._poster.add(result)
-        self._keep(self._crops.add(frame, picture))
+        self.context.poster.add(result)
+        self._keep(self.context.crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:
         for crop in crops:
             self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
-        settings, traffic = self.context.settings, self.traffic
-        counts, start = traffic.counts(), float(self.video.start)
+        settings, traffic, start = self.context.settings, self.traffic, float(self.video.start)
         return VideoPage(
             video=self.video,
             frames=self._frames,
             spans=self._spans or [(start, start)],
             records=traffic.vehicles,
             thumbnails=self._thumbnails,
-            poster=self._poster.image(traffic.vehicles),
+            poster=self.context.poster.image(traffic.vehicles),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
-            survey=Survey({self.video.name: counts}, settings) if counts else None,
+            survey=self.context.survey,
             interval=settings.traffic.seconds or 60,
             clock=traffic.clock,
-            pictures=self._pictures(),
+            pictures=self._addresses(self.context.crop_files),
             findings=findings_in(self.context.facts).items,
-            clips=self._clips(),
+            clips=self._addresses(self.context.clip_files),
             review=self._review(),
         )
 
@@ -192,28 +188,9 @@ class PageSink(BaseSink):
         folders = self._paths_of("review")
         return link_to(folders[0] / REVIEW_NAME, self.path) if folders else ""
 
-    def _clips(self) -> dict[int, str]:
-        """Return the addresses of the clips of the vehicles, if this run writes them."""
-        traffic, margin = self.traffic, self.context.settings.clips.margin
-        return {
-            vehicle.id: link_to(folder / clip.name, self.path)
-            for folder in self._paths_of("clips")[:1]
-            for scene in scenes(counted_vehicles(traffic), margin)
-            for clip in self.context.files.staged_path(folder).glob(
-                scene.name(traffic.clock) + ".*"
-            )
-            for vehicle in scene.vehicles
-        }
-
-    def _pictures(self) -> dict[int, str]:
-        """Return the addresses of the images of `crops`, if this run writes them."""
-        times = {number: time for number, (time, _) in self._thumbnails.items()}
-        return {
-            vehicle.id: link_to(folder / _crop_name(vehicle, times[vehicle.id]), self.path)
-            for folder in self._paths_of("crops")[:1]
-            for vehicle in self.traffic.vehicles
-            if vehicle.id in times
-        }
+    def _addresses(self, files: Mapping[int, Path]) -> dict[int, str]:
+        """Return the addresses of files by the id of a vehicle."""
+        return {number: link_to(path, self.path) for number, path in files.items()}
 
     def _player(self) -> Player | None:
         """Return the video that this run writes, else the source if it is a video file."""
@@ -306,28 +283,32 @@ class ClipSink(BaseSink):
         for scene in scenes(counted_vehicles(self.traffic), self.context.settings.clips.margin):
             name = scene.name(self.traffic.clock)
             try:
-                self._cut(scene, folder / name)
+                clip = self._cut(scene, folder / name)
+                files = dict.fromkeys((item.id for item in scene.vehicles), self.path / clip.name)
+                self.context.clip_files.update(files)
             except (OutputError, VideoError) as error:
                 if isinstance(error.__cause__, OSError):  # such as a full disk
                     raise
                 (folder / f"{name}.mp4").unlink(missing_ok=True)
                 log.warning("%s: the clip %s was not written: %s", source, name, error)
 
-    def _cut(self, scene: Scene, stem: Path) -> None:
-        """Copy or encode a scene; a part that cannot be copied is encoded."""
+    def _cut(self, scene: Scene, stem: Path) -> Path:
+        """Copy or encode a scene, and return its file; a part that cannot be copied is encoded."""
         video, sides = self.video, (scene.start, scene.end)
         start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
         end += 1 / video.rate / 2  # the frame at the end is shown too
         if self._copied_suffix:
             target = stem.with_name(stem.name + self._copied_suffix)
             try:
-                return copy_part(video.path, start, end, target)
+                copy_part(video.path, start, end, target)
+                return target
             except OutputError as error:
                 target.unlink(missing_ok=True)
                 log.debug("%s; encoded instead", error)
         target = stem.with_name(f"{stem.name}.mp4")
         part = max(start - video.start, Fraction(0)), end - video.start
-        return encode_part(video.path, *part, target, self.context.settings)
+        encode_part(video.path, *part, target, self.context.settings)
+        return target
 
 
 def _is_clip(path: Path) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
@@ -18,7 +19,10 @@ from vdet.run.result import Fact, FrameResult
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:  # an image needs no traffic: a tenth of the time of `detect-image`
+    from vdet.run.sinks.poster import Poster
     from vdet.traffic.live import LiveTraffic
+    from vdet.traffic.records import BestCrops
+    from vdet.traffic.survey import Survey
 
 STANDARD_OUTPUT = Path("-")
 
@@ -35,9 +39,9 @@ class Sink(AbstractContextManager["Sink"], Protocol):
         """Receive the next result, without changing the frame's image."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SinkContext:
-    """What a sink receives when it is opened.
+    """What a sink receives when it is opened, and what the sinks of a run share.
 
     Attributes
     ----------
@@ -59,6 +63,8 @@ class SinkContext:
     facts
         Results of steps about the whole video, by name; empty before sinks finish. Sinks that
         finish first may add to them.
+    crop_files, clip_files
+        The image and the clip of a vehicle by its id, once the sinks that write them have finished.
     places
         For single images: their paths below the input folders.
     stage_images
@@ -76,8 +82,32 @@ class SinkContext:
     outputs: tuple[Output, ...] = ()
     traffic: "LiveTraffic | None" = None
     facts: dict[str, Fact] = field(default_factory=dict)
+    crop_files: dict[int, Path] = field(default_factory=dict)
+    clip_files: dict[int, Path] = field(default_factory=dict)
     places: Mapping[Path, Path] = field(default_factory=dict)
     stage_images: StageImages = lambda *_: {}
+
+    @cached_property
+    def poster(self) -> "Poster":
+        """The frame with the most vehicles; sinks that use it add each result."""
+        from vdet.run.sinks.poster import Poster
+
+        return Poster(is_coarse=self.settings.output.coarse)
+
+    @cached_property
+    def crops(self) -> "BestCrops":
+        """The best image of each vehicle; sinks that use them add each result."""
+        from vdet.traffic.records import BestCrops
+
+        return BestCrops(is_coarse=self.settings.output.coarse)
+
+    @cached_property
+    def survey(self) -> "Survey | None":
+        """The tables of the counts, once sinks finish; None without lines and zones."""
+        from vdet.traffic.survey import Survey
+
+        counts = self.traffic.counts() if self.traffic else None
+        return Survey({self.video.name: counts}, self.settings) if counts and self.video else None
 
 
 class BaseSink:

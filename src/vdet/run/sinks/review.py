@@ -19,8 +19,8 @@ from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, crop_name, 
 from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.track.track import FrameTracks
-from vdet.traffic.counts import Event
-from vdet.traffic.records import BestCrops, Crop
+from vdet.traffic.counts import Event, Trace
+from vdet.traffic.records import Crop
 from vdet.traffic.strips import (
     Band,
     Passage,
@@ -29,7 +29,7 @@ from vdet.traffic.strips import (
     bands_of,
     sampling_of,
 )
-from vdet.traffic.traces import Trace, TraceSearch
+from vdet.traffic.traces import TraceSearch
 
 _MINUTE = 60
 _ENOUGH = 6
@@ -95,7 +95,6 @@ class ReviewSink(BaseSink):
         self._tracks: list[FrameTracks] = []
         self._traces: list[Trace] = []
         self._passages = Passages(bands)
-        self._crops = BestCrops(is_coarse=context.settings.output.coarse)
         self._folder = tempfile.TemporaryDirectory()
         self._pictures: list[StripPicture] = []
         self._minute = 0
@@ -120,7 +119,7 @@ class ReviewSink(BaseSink):
         self._passages.add(self._tracks[-1])
         for strip, passages in zip(self._strips, self._passages.by_band, strict=True):
             strip.add(seconds - _MINUTE * minute, picture, passages)
-        self._write_crops(self._crops.add(result.frame_tracks, picture))
+        self._write_crops(self.context.crops.add(result.frame_tracks, picture))
 
     def _end_minute(self, *, is_end: bool) -> None:
         for number, (strip, passages) in enumerate(
@@ -176,7 +175,7 @@ class ReviewSink(BaseSink):
         """Write the page."""
         self._end_minute(is_end=True)
         self._add_traces()
-        self._write_crops(self._crops.end())
+        self._write_crops(self.context.crops.end())
         counts = self.traffic.counts()
         assert counts
         review = Review(
