@@ -7,8 +7,6 @@ from vdet.boxes import Image
 from vdet.pages.charts import Plot, interval_plot, time_axis
 from vdet.pages.render import render
 from vdet.pages.traffic import page_table
-from vdet.traffic.clock import Intervals
-from vdet.traffic.counts import Counts, directions_of
 from vdet.traffic.survey import Survey
 
 _INTERVAL = 900
@@ -27,29 +25,31 @@ def counts_page(survey: Survey, picture: Image | None = None) -> str:
         flows=page_table(survey.flows()),
         files=page_table(survey.files()),
         notes=page_table(survey.notes())[1],
-        plot=_plot(survey.counts, survey.settings.traffic.seconds or _INTERVAL),
+        plot=_plot(survey, survey.settings.traffic.seconds or _INTERVAL),
         picture=picture,
     )
 
 
-def _plot(counts: list[Counts], length: int) -> Plot | None:
+def _plot(survey: Survey, length: int) -> Plot | None:
     """Return the vehicles in each direction by interval; None if some of several have no clock.
 
     With lines, the events of zones are left out: most of their vehicles cross lines too.
     """
-    if len(counts) > 1 and not all(video.clock for video in counts):
+    if len(survey.counts) > 1 and not all(video.clock for video in survey.counts):
         return None
-    intervals = Intervals([(video.clock, video.spans) for video in counts], length)
-    first, last = intervals.periods[0], intervals.periods[-1]
-    directions, zones = directions_of(counts), {name for video in counts for name in video.zones}
+    directions = survey.groups.directions
+    zones = {name for video in survey.counts for name in video.zones}
     names = {name for name, _ in directions} - zones or zones
-    series = {
-        f"{name}: {direction}": Counter[float]() for name, direction in directions if name in names
+    tally = survey.groups.tally(directions, length)
+    periods = tally.intervals.periods
+    first, last = periods[0], periods[-1]
+    series: dict[str, Counter[float]] = {
+        ": ".join(key): +Counter(
+            {item.number - first.number: tally.numbers[item.number, key, None] for item in periods}
+        )
+        for key in directions
+        if key[0] in names
     }
-    for index, video in enumerate(counts):
-        for event in (event for event in video.events if event.name in names):
-            start = intervals.number(index, event.time) - first.number
-            series[f"{event.name}: {event.direction}"][start] += 1
     if not any(series.values()):
         return None
     zero = None

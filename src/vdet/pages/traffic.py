@@ -21,7 +21,7 @@ from vdet.errors import ConfigError, clock_text
 from vdet.media.images import read_image
 from vdet.pages.render import Table
 from vdet.polygons import Point
-from vdet.traffic.counts import Counts, Direction, direction_totals, trips_by_flow
+from vdet.traffic.counts import Counts, Direction, EventGroups
 from vdet.traffic.crossings import Border, Line, lines_and_zones
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.workbook import Cell, SheetTable
@@ -61,12 +61,13 @@ def traffic_marks(
 
     `paths` are those of tracks by id, pixels.
     """
-    totals = {(total.name, total.direction): total.count for total in direction_totals(videos)}
+    groups = EventGroups(videos)
+    totals = {direction: len(events) for direction, events in groups.directions.items()}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
-    flows = trips_by_flow(videos).values()
+    flows = groups.flows.values()
     maximum = max(map(len, flows), default=1)
     for number, trips in enumerate(flows):
-        last_events = [trip.last or trip.first for trip in trips]
+        last_events = [trip.last or trip.event for trip in trips]
         shown = sorted((paths[event.id] for event in last_events if event.id in paths), key=len)
         typical = shown[len(shown) // 2] if shown else ()
         path = _inside(typical, size)

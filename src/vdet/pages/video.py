@@ -1,6 +1,6 @@
 """The page of a video: which vehicles appear, when, where, and their images."""
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -233,20 +233,19 @@ class VideoPage:
 
         There are none if there is only one interval.
         """
-        step, intervals = self.interval, Intervals([(self.clock, self.spans)], self.interval)
-        first = {item.number: intervals.start_in(0, item.number) for item in intervals.periods}
-        if len(first) == 1:
+        intervals = Intervals([(self.clock, self.spans)], self.interval)
+        if len(intervals.periods) == 1:
             return []
-        appeared: defaultdict[str, Counter[float]] = defaultdict(Counter)
-        for record in self._moved:
-            start = first[intervals.number(0, record.first)]
-            appeared[record.class_name or UNKNOWN][start] += 1
-        counted: defaultdict[str, Counter[float]] = defaultdict(Counter)
-        for event in self.counts.events if self.counts else ():
-            start = first[intervals.number(0, event.time)]
-            counted[f"{event.name}: {event.direction}"][start] += 1
-        plots = ("First seen", appeared), ("At lines and zones", counted)
-        return [interval_plot(data, x, step, title, self.zero) for title, data in plots if data]
+        seen = [(record.class_name or UNKNOWN, record.first) for record in self._moved]
+        events = self.counts.events if self.counts else ()
+        counted = [(f"{event.name}: {event.direction}", event.time) for event in events]
+        plots = []
+        for title, items in (("First seen", seen), ("At lines and zones", counted)):
+            series: dict[str, Counter[float]] = {name: Counter() for name, _ in items}
+            for name, time in items:
+                series[name][intervals.start_in(0, intervals.number(0, time))] += 1
+            plots += [interval_plot(series, x, self.interval, title, self.zero)] if series else []
+        return plots
 
     def _traffic(self) -> Image | None:
         """Return the poster with lines, zones and flows."""

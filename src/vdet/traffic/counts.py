@@ -4,12 +4,13 @@ Tables cover the whole video or intervals of it. Several videos have one table.
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from itertools import accumulate, pairwise, product
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from vdet.config.classes import UNKNOWN
+from vdet.config.shapes import NOWHERE
 from vdet.errors import ArgumentError, needing, quantity
 from vdet.findings import Finding, warnings_in
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 Direction = tuple[str, str]
 """Name of a line or zone, and of a direction."""
+Flow = tuple[str, str | None]
+"""Names of the first and the last line or zone of a vehicle; None if there is only one."""
 
 _IN = ENTER, APPEAR
 
@@ -74,25 +77,20 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Trip:
-    """The first and the last event of a vehicle.
+class GroupedEvent:
+    """An event in the group of its direction, or the first event of a vehicle, in its flow.
 
     Attributes
     ----------
     video
-        Number of the video of the first event.
+        Number of the video.
     last
-        None if there is only one event.
+        In a flow, the last event of the vehicle; None if there is only one.
     """
 
     video: int
-    first: Event
-    last: Event | None
-
-    @property
-    def flow(self) -> tuple[str, str | None]:
-        """The first line or zone, and the last one."""
-        return self.first.name, self.last.name if self.last else None
+    event: Event
+    last: Event | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,19 +297,111 @@ class Counts:
         return pd.DataFrame(self.table(interval), columns=names)
 
 
+class EventGroups:
+    """The events of videos, grouped once: tables, charts and sheets are views of these groups.
+
+    Attributes
+    ----------
+    directions
+        All events of each direction of each line and zone.
+    flows
+        The first event of each vehicle that crosses a line or enters a zone, by the line or zone of
+        this event and of the last one, the largest flow first.
+    """
+
+    def __init__(self, videos: Sequence[Counts]) -> None:
+        self._videos = videos
+        self.directions: dict[Direction, list[GroupedEvent]] = {
+            direction: [] for video in videos for direction in video.directions
+        }
+        visits: dict[int, list[GroupedEvent]] = {}
+        for number, video in enumerate(videos):
+            names = set(video.flow_names)
+            for event in video.events:
+                grouped = GroupedEvent(number, event)
+                self.directions[event.name, event.direction].append(grouped)
+                is_visit = event.name not in video.zones or event.direction in _IN
+                if is_visit and event.name in names:
+                    visits.setdefault(event.vehicle, []).append(grouped)
+        flows: dict[Flow, list[GroupedEvent]] = {}
+        for first, *later in visits.values():
+            trip = replace(first, last=later[-1].event if later else None)
+            destination = trip.last.name if trip.last else None
+            flows.setdefault((trip.event.name, destination), []).append(trip)
+        self.flows = dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
+
+    @property
+    def flow_names(self) -> list[str]:
+        """The lines and zones at which flows begin and end."""
+        return list(dict.fromkeys(name for video in self._videos for name in video.flow_names))
+
+    @property
+    def ordered_flows(self) -> list[Flow]:
+        """The flows in the order of the lines and zones."""
+        names: list[str | None] = [*self.flow_names, None]
+        return sorted(self.flows, key=lambda flow: list(map(names.index, flow)))
+
+    @property
+    def classes(self) -> list[str]:
+        """The classes in the columns of a table: equal for all videos of one camera.
+
+        They are those of the settings, then all others that were counted. `UNKNOWN` stands for all
+        vehicles of a detector without classes.
+        """
+        counted = {event.class_name for video in self._videos for event in video.events}
+        if counted <= {None} and counted:
+            return [UNKNOWN]
+        listed = (name for video in self._videos for name in video.classes)
+        others = sorted(name or UNKNOWN for name in counted)
+        return list(dict.fromkeys((*listed, *others))) or [UNKNOWN]
+
+    def intervals(self, length: int | None = None) -> Intervals:
+        """Return the intervals of the videos; errors as for `count_table`."""
+        if length is not None and length < 1:
+            raise ArgumentError(f"interval: must be at least 1 second, not {length}")
+        return Intervals([(video.clock, video.spans) for video in self._videos], length)
+
+    def tally(
+        self, groups: Mapping[Key, Iterable[GroupedEvent]], length: int | None = None
+    ) -> "Tally[Key]":
+        """Count the events of each group by intervals of a length, seconds; None for one."""
+        intervals = self.intervals(length)
+        numbers = Counter[tuple[int | None, Key | None, str | None]]()
+        for key, group in groups.items():
+            for item in group:
+                number = intervals.number(item.video, item.event.time)
+                numbers.update(product((number, None), (key, None), (class_of(item.event), None)))
+        return Tally(intervals, numbers)
+
+
+@dataclass(frozen=True, slots=True)
+class Tally(Generic[Key]):
+    """Numbers of events by interval, key of the group, and class; None stands for all of them."""
+
+    intervals: Intervals
+    numbers: Counter[tuple[int | None, Key | None, str | None]]
+
+    def rows(self, keys: Iterable[Key]) -> Iterator[tuple[Any, ...]]:
+        """Yield the values of each interval, key, and class that occurs, even if it is 0."""
+        classes = sorted({kind for _, _, kind in self.numbers if kind}) or [UNKNOWN]
+        for period, key, kind in product(self.intervals.periods, keys, classes):
+            count = self.numbers[period.number, key, kind]
+            flow = period.observed, period.is_part, per_hour(count, period.observed)
+            yield period.start, period.end, *key, kind, count, *flow
+
+
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
     """Return the totals of each direction over all videos."""
-    classes = {key: Counter[str]() for key in directions_of(videos)}
-    for event in (event for video in videos for event in video.events):
-        classes[event.name, event.direction][event.class_name or ""] += 1
     return tuple(
         DirectionTotal(
             name=name,
             direction=direction,
-            count=counts.total(),
-            classes={kind: counts[kind] for kind in sorted(counts) if kind},
+            count=len(group),
+            classes=dict(
+                sorted(Counter(kind for item in group if (kind := item.event.class_name)).items())
+            ),
         )
-        for (name, direction), counts in classes.items()
+        for (name, direction), group in EventGroups(videos).directions.items()
     )
 
 
@@ -330,13 +420,9 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
     ArgumentError
         `interval` is less than 1.
     """
-    intervals = _intervals(videos, interval)
-    counts = Counter(
-        (intervals.number(index, event.time), (event.name, event.direction), class_of(event))
-        for index, video in enumerate(videos)
-        for event in video.events
-    )
-    return [CountRow(*values) for values in _rows(intervals, counts, directions_of(videos))]
+    groups = EventGroups(videos)
+    tally = groups.tally(groups.directions, interval)
+    return [CountRow(*values) for values in tally.rows(groups.directions)]
 
 
 def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
@@ -345,14 +431,9 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     Both are the same if a vehicle returns. A flow counts in the interval of its first event.
     Parameters and errors as for `count_table`.
     """
-    intervals = _intervals(videos, interval)
-    counts: Counter[tuple[int, tuple[str, str | None], str]] = Counter()
-    for trip in trips_of(videos):
-        number = intervals.number(trip.video, trip.first.time)
-        counts[number, trip.flow, class_of(trip.first)] += 1
-    names: list[str | None] = [*flow_names(videos), None]
-    flows = sorted({flow for _, flow, _ in counts}, key=lambda flow: list(map(names.index, flow)))
-    return [FlowRow(*values) for values in _rows(intervals, counts, flows)]
+    groups = EventGroups(videos)
+    tally = groups.tally(groups.flows, interval)
+    return [FlowRow(*values) for values in tally.rows(groups.ordered_flows)]
 
 
 def per_hour(count: float, seconds: float) -> float | None:
@@ -360,48 +441,9 @@ def per_hour(count: float, seconds: float) -> float | None:
     return round(3600 * count / seconds, 1) if seconds else None
 
 
-def flow_names(videos: Sequence[Counts]) -> list[str]:
-    """Return the lines and zones at which flows begin and end."""
-    return list(dict.fromkeys(name for video in videos for name in video.flow_names))
-
-
-def class_columns(videos: Sequence[Counts]) -> list[str]:
-    """Return the classes in the columns of a table: equal for all videos of one camera.
-
-    They are those of the settings, then all others that were counted. `UNKNOWN` stands for all
-    vehicles of a detector without classes.
-    """
-    counted = {event.class_name for video in videos for event in video.events}
-    if counted <= {None} and counted:
-        return [UNKNOWN]
-    listed = (name for video in videos for name in video.classes)
-    return list(dict.fromkeys((*listed, *sorted(name or UNKNOWN for name in counted)))) or [UNKNOWN]
-
-
-def trips_of(videos: Sequence[Counts]) -> Iterator[Trip]:
-    """Yield the trip of each vehicle that crosses a line or enters a zone."""
-    trips: dict[int, list[tuple[int, Event]]] = {}
-    for index, video in enumerate(videos):
-        names = set(video.flow_names)
-        for event in video.events:
-            is_visit = event.name not in video.zones or event.direction in _IN
-            if is_visit and event.name in names:
-                trips.setdefault(event.vehicle, []).append((index, event))
-    for (index, first), *later in trips.values():
-        yield Trip(index, first, later[-1][1] if later else None)
-
-
-def trips_by_flow(videos: Sequence[Counts]) -> dict[tuple[str, str | None], list[Trip]]:
-    """Return the trips of each flow, the largest flow first."""
-    flows: dict[tuple[str, str | None], list[Trip]] = {}
-    for trip in trips_of(videos):
-        flows.setdefault(trip.flow, []).append(trip)
-    return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
-
-
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:
     """Return the use of each zone in each interval; parameters and errors as for `count_table`."""
-    intervals = _intervals(videos, interval)
+    intervals = EventGroups(videos).intervals(interval)
     rows = []
     for name in dict.fromkeys(name for video in videos for name in video.zones):
         changes: defaultdict[int, list[_Change]] = defaultdict(list)
@@ -451,31 +493,11 @@ def _zone_row(name: str, period: Interval, changes: Sequence[_Change], inside: i
     )
 
 
-def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
-    if interval is not None and interval < 1:
-        raise ArgumentError(f"interval: must be at least 1 second, not {interval}")
-    return Intervals([(video.clock, video.spans) for video in videos], interval)
-
-
-def directions_of(videos: Sequence[Counts]) -> list[Direction]:
-    """Return each direction of each line and zone."""
-    return list(dict.fromkeys(direction for video in videos for direction in video.directions))
-
-
 def class_of(event: Event) -> str:
     """Return the class of its vehicle, `UNKNOWN` if the detector has no classes."""
     return event.class_name or UNKNOWN
 
 
-def _rows(
-    intervals: Intervals, counts: Counter[tuple[int, Key, str]], keys: Iterable[Key]
-) -> Iterator[tuple[Any, ...]]:
-    """Yield the values of each interval, direction or flow, and class that occurs, even if it is 0.
-
-    The keys of `counts` are the number of the interval, the direction or flow, and the class.
-    """
-    classes = sorted({kind for _, _, kind in counts}) or [UNKNOWN]
-    for period, key, kind in product(intervals.periods, keys, classes):
-        count = counts[period.number, key, kind]
-        flow = period.observed, period.is_part, per_hour(count, period.observed)
-        yield period.start, period.end, *key, kind, count, *flow
+def names_in(key: Iterable[str | None]) -> list[str]:
+    """Return the names in the key of a group, `NOWHERE` for None."""
+    return [NOWHERE if name is None else name for name in key]

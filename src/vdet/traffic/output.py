@@ -4,7 +4,6 @@ The ending of a name selects the table; `.json` has all tables. Several videos h
 interval; events have the name of their video.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, fields
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 
 from vdet.config.shapes import NOWHERE
 from vdet.traffic import counts as tables
-from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow
+from vdet.traffic.counts import CountRow, Counts, Event, EventGroups, FlowRow, Key, Tally, ZoneRow
 from vdet.traffic.tables import VIDEO, is_json, plain_time
 
 _HEADINGS = {
@@ -65,8 +64,9 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
     if _is_table(path, ".totals"):
         return [_TOTALS, *map(_cells, tables.count_table(every, interval))]
     if _is_table(path, ".wide"):
-        rows = tables.count_table(every, interval)
-        return wide_table(rows, tables.class_columns(every), ": ", has_total=False)
+        groups = EventGroups(every)
+        tally = groups.tally(groups.directions, interval)
+        return wide_table(tally, groups.directions, groups.classes, ": ", has_total=False)
     if _is_table(path, ".zones"):
         return [_ZONES, *map(_cells, tables.zone_table(every, interval))]
     events = {name: [_event(video, e) for e in video.events] for name, video in videos.items()}
@@ -81,47 +81,43 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
     Parameters and errors as for `counts_content`.
     """
     every = list(videos.values())
-    rows = tables.flow_table(every, interval)
     if is_json(path):
-        content = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every)}
+        rows = _items(_FLOWS, tables.flow_table(every, interval))
+        content = {"flows": rows, "matrix": flow_matrix(every)}
         return _json(videos, interval, content, events=False)
     if _is_table(path, ".wide"):
-        return wide_table(rows, tables.class_columns(every), " to ", has_total=True)
-    return [_FLOWS, *map(_cells, rows)]
+        groups = EventGroups(every)
+        tally = groups.tally(groups.flows, interval)
+        return wide_table(tally, groups.ordered_flows, groups.classes, " to ", has_total=True)
+    return [_FLOWS, *map(_cells, tables.flow_table(every, interval))]
 
 
 def wide_table(
-    rows: Sequence[CountRow | FlowRow], classes: Sequence[str], between: str, *, has_total: bool
+    tally: Tally[Key], keys: Iterable[Key], classes: Sequence[str], between: str, *, has_total: bool
 ) -> list[Sequence[Any]]:
-    """Return a table with a row for each interval, a column for each pair and class, and sums.
+    """Return a table with a row for each interval, a column for each key and class, and sums.
 
-    `between` is the text between the two names of a pair. With `has_total`, the last column is the
-    sum of all pairs.
+    `between` is the text between the two names of a key. With `has_total`, the last column is the
+    sum of all keys.
     """
-    sums: Counter[tuple[Any, ...]] = Counter()
-    cells = [_cells(row)[:6] for row in rows]
-    for start, end, *pair, name, count in cells:
-        for interval in ((start, end), (ALL, "")):
-            for column in ((*pair, name), (*pair, None), ()):  # a class may be called all
-                sums[*interval, *column] += count
-    intervals = dict.fromkeys(tuple(row[:2]) for row in cells)
-    pairs = dict.fromkeys(tuple(row[2:4]) for row in cells)
-    columns = [(*pair, name) for pair in pairs for name in (*classes, None)]
-    heading = [f"{between.join(pair)}, {name or ALL}" for *pair, name in columns]
-    if has_total:
-        columns.append(())
-        heading.append(ALL)
-    times = (*intervals, (ALL, ""))
-    body = ((*time, *(sums[*time, *column] for column in columns)) for time in times)
-    return [("start", "end", *heading), *body]
+    columns = [(key, name) for key in keys for name in (*classes, None)]
+    heading = [f"{between.join(tables.names_in(key))}, {name or ALL}" for key, name in columns]
+    every: list[tuple[Key | None, str | None]] = [*columns, *([(None, None)] if has_total else [])]
+    times = [(period.start, period.end, period.number) for period in tally.intervals.periods]
+    body = (
+        [plain_time(start), plain_time(end), *(tally.numbers[number, *column] for column in every)]
+        for start, end, number in (*times, (ALL, "", None))
+    )
+    return [("start", "end", *heading, *([ALL] if has_total else [])), *body]
 
 
 def flow_matrix(videos: Sequence[Counts]) -> dict[str, dict[str, int]]:
     """Return the number of vehicles by origin and destination, which may be `NOWHERE`."""
-    flows = Counter(trip.flow for trip in tables.trips_of(videos))
-    names = tables.flow_names(videos)
+    groups = EventGroups(videos)
+    names = groups.flow_names
     return {
-        origin: {end or NOWHERE: flows[origin, end] for end in (*names, None)} for origin in names
+        origin: {end or NOWHERE: len(groups.flows.get((origin, end), ())) for end in (*names, None)}
+        for origin in names
     }
 
 

@@ -1,9 +1,7 @@
 """The tables of a survey, for its workbook and its pages."""
 
-from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from itertools import chain, product
 
@@ -16,7 +14,7 @@ from vdet.errors import ConfigError, quantity
 from vdet.traffic import counts as tables
 from vdet.traffic import measures
 from vdet.traffic.clock import SEAM, ClockTime, Interval, Intervals
-from vdet.traffic.counts import Counts, Event, ZoneRow, class_of
+from vdet.traffic.counts import Counts, GroupedEvent, Key, Tally, ZoneRow, class_of, names_in
 from vdet.traffic.estimate import Estimate
 from vdet.traffic.workbook import Cell, Sheet, SheetTable
 from vdet.version import __version__
@@ -41,18 +39,6 @@ turning movement: N left is from the northern arm of the junction to the left.
 checks: the true number of passages at all checked lines and zones, with its interval of 95 %."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Passage:
-    """A vehicle at a line or zone; `video` is the number of the video."""
-
-    video: int
-    event: Event
-
-
-_Groups = Mapping[tuple[str, str], Sequence[_Passage]]
-"""Passages by line or zone and direction, or the first ones of trips by origin and destination."""
-
-
 class Survey:
     """The tables of a survey; a table is None if there is nothing that it could show.
 
@@ -65,6 +51,8 @@ class Survey:
     ----------
     counts
         Those of each video.
+    groups
+        Their events.
 
     Raises
     ------
@@ -75,25 +63,15 @@ class Survey:
     def __init__(self, videos: Mapping[str, Counts], settings: Settings) -> None:
         self.videos, self.settings = videos, settings
         self.counts = list(videos.values())
-        self._classes = tables.class_columns(self.counts)
-        self._whole = self._intervals(None).periods[0]
-        directions: dict[tuple[str, str], list[_Passage]] = {
-            direction: [] for direction in tables.directions_of(self.counts)
-        }
-        for number, counts in enumerate(self.counts):
-            for event in counts.events:
-                directions[event.name, event.direction].append(_Passage(number, event))
-        self._directions: _Groups = directions
-        self._flows: _Groups = {
-            (origin, destination or NOWHERE): [_Passage(trip.video, trip.first) for trip in trips]
-            for (origin, destination), trips in tables.trips_by_flow(self.counts).items()
-        }
+        self.groups = tables.EventGroups(self.counts)
+        self._classes = self.groups.classes
+        self._whole = self.groups.intervals().periods[0]
 
     def sheets(self, picture: Image | None = None) -> list[Sheet]:
         """Return the sheets of the workbook; `picture` is the scene, as for `Sheet`."""
         single = {
-            "Intervals": self._by_interval(_DIRECTION, self._directions),
-            "Flows": self._by_interval(_FLOW, self._flows),
+            "Intervals": self._by_interval(_DIRECTION, self.groups.directions),
+            "Flows": self._by_interval(_FLOW, self.groups.flows),
             "Turning movements": self._movements(),
             "Zones": self._zones(),
             "Vehicles": self._vehicles(),
@@ -136,33 +114,38 @@ class Survey:
 
     def volumes(self) -> SheetTable:
         """Return the number of vehicles in each direction, their peak hour and their speeds."""
-        quarters = None
-        with suppress(ConfigError):  # there is no clock
-            quarters = self._intervals(measures.QUARTER)
-        trips = list(chain.from_iterable(self._flows.values()))
-        rows = [
-            [*pair, *self._cells(passages), *_peak_hour(passages, quarters), *_speeds(passages)]
-            for pair, passages in {**self._directions, ("all flows", ""): trips}.items()
-        ]
+        groups = self.groups
+        rows = [*self._volumes(groups.directions, groups.directions)]
+        rows += self._volumes(groups.flows, [None])
         headings = [*_DIRECTION, *self._headings, *_PEAK, *_SPEEDS]
         return SheetTable(headings, rows, "Volumes").without_empty_columns()
 
+    def _volumes(
+        self, groups: Mapping[Key, Sequence[GroupedEvent]], keys: Iterable[Key | None]
+    ) -> Iterator[list[Cell]]:
+        """Yield the volumes of groups; None stands for all flows."""
+        whole, quarters = self.groups.tally(groups), None
+        with suppress(ConfigError):  # there is no clock
+            quarters = self.groups.tally(groups, measures.QUARTER)
+        for key in keys:
+            events = chain.from_iterable(groups.values()) if key is None else groups[key]
+            names = names_in(key or ("all flows", ""))
+            yield [*names, *self._cells(whole, key), *_peak_hour(quarters, key), *_speeds(events)]
+
     def flows(self) -> SheetTable:
         """Return the number of vehicles in each flow, the largest flow first."""
-        rows = [[*flow, *self._cells(trips)] for flow, trips in self._flows.items()]
+        tally = self.groups.tally(self.groups.flows)
+        rows = [[*names_in(flow), *self._cells(tally, flow)] for flow in self.groups.flows]
         return SheetTable([*_FLOW, *self._headings], rows)
 
-    def _by_interval(self, names: Sequence[str], groups: _Groups) -> SheetTable:
+    def _by_interval(
+        self, names: Sequence[str], groups: Mapping[Key, Sequence[GroupedEvent]]
+    ) -> SheetTable:
         """Return the number of vehicles in each group and interval."""
-        intervals = self._intervals(self.settings.traffic.seconds)
-        passages_in = defaultdict[tuple[int, tuple[str, str]], list[_Passage]](list)
-        for pair, passages in groups.items():
-            for passage in passages:
-                number = intervals.number(passage.video, passage.event.time)
-                passages_in[number, pair].append(passage)
+        tally = self.groups.tally(groups, self.settings.traffic.seconds)
         rows = [
-            [*_interval(period), *pair, *self._cells(passages_in[period.number, pair], period)]
-            for period, pair in product(intervals.periods, groups)
+            [*_interval(period), *names_in(key), *self._cells(tally, key, period)]
+            for period, key in product(tally.intervals.periods, groups)
         ]
         return SheetTable([*_TIMES, *names, *self._headings], rows)
 
@@ -173,15 +156,17 @@ class Survey:
         units = ["PCU"] if self.settings.traffic.pcu else []
         return ["all vehicles", "per hour", *classes, *units]
 
-    def _cells(self, passages: Sequence[_Passage], period: Interval | None = None) -> list[Cell]:
-        """Return the cells below `_headings`, for passages in a period; None: the whole time."""
-        numbers = Counter(class_of(passage.event) for passage in passages)
-        total, units = len(passages), self.settings.traffic.pcu
+    def _cells(
+        self, tally: Tally[Key], key: Key | None, period: Interval | None = None
+    ) -> list[Cell]:
+        """Return the cells below `_headings`, for events in a period; None: the whole time."""
+        number = period.number if period else None
+        numbers = {name: tally.numbers[number, key, name] for name in self._classes}
+        total, units = tally.numbers[number, key, None], self.settings.traffic.pcu
         cells: list[Cell] = [total, tables.per_hour(total, (period or self._whole).observed)]
-        if len(self._classes) > 1:
-            heavy = sum(numbers[name] for name in measures.HEAVY)
-            cells += [numbers[name] for name in self._classes]
-            cells.append(round(100 * heavy / total, 1) if total else None)
+        if len(numbers) > 1:
+            heavy = sum(numbers.get(name, 0) for name in measures.HEAVY)
+            cells += [*numbers.values(), round(100 * heavy / total, 1) if total else None]
         if units:
             cells.append(sum(count * units.get(name, 1.0) for name, count in numbers.items()))
         return cells
@@ -191,20 +176,18 @@ class Survey:
         arm_of = {line.name: line.approach for line in self.settings.traffic.lines}
         arms = [arm for arm in measures.APPROACHES if arm in arm_of.values()]
         turns = list(product(arms, (*measures.MOVEMENTS, _ALL)))
-        intervals = self._intervals(self.settings.traffic.seconds)
-        numbers, sums = Counter[tuple[int, str, str]](), Counter[tuple[str, str]]()
-        for (first, last), trips in self._flows.items():
-            origin, destination = arm_of.get(first), arm_of.get(last)
+        turning: dict[tuple[str, str], list[GroupedEvent]] = {turn: [] for turn in turns}
+        for (first, last), trips in self.groups.flows.items():
+            origin, destination = arm_of.get(first), arm_of.get(last or NOWHERE)
             if origin and destination:
-                turn = measures.movement(origin, destination)
-                for trip, name in product(trips, (turn, _ALL)):
-                    numbers[intervals.number(trip.video, trip.event.time), origin, name] += 1
-                    sums[origin, name] += 1
+                turning[origin, measures.movement(origin, destination)] += trips
+                turning[origin, _ALL] += trips
+        tally = self.groups.tally(turning, self.settings.traffic.seconds)
         rows: list[list[Cell]] = [
-            [*_interval(period), *(numbers[period.number, *turn] for turn in turns)]
-            for period in intervals.periods
+            [*_interval(period), *(tally.numbers[period.number, turn, None] for turn in turns)]
+            for period in tally.intervals.periods
         ]
-        rows.append([_ALL, None, None, None, *(sums[turn] for turn in turns)])
+        rows.append([_ALL, None, None, None, *(len(turning[turn]) for turn in turns)])
         return SheetTable([*_TIMES, *map(" ".join, turns)], rows if arms else [])
 
     def _zones(self) -> SheetTable:
@@ -266,9 +249,6 @@ class Survey:
         rows += [["", f"PCU: {', '.join(units)}; all other classes 1."]] if units else []
         return SheetTable(("file", "note"), rows)
 
-    def _intervals(self, length: int | None) -> Intervals:
-        return Intervals([(counts.clock, counts.spans) for counts in self.counts], length)
-
 
 def _time(value: ClockTime) -> Cell:
     """Return a clock time, or seconds of a video, as a cell."""
@@ -280,18 +260,19 @@ def _interval(row: ZoneRow | Interval) -> list[Cell]:
     return [_time(row.start), _time(row.end), row.observed, "part" if row.is_part else None]
 
 
-def _peak_hour(passages: Sequence[_Passage], quarters: Intervals | None) -> list[Cell]:
+def _peak_hour(quarters: Tally[Key] | None, key: Key | None) -> list[Cell]:
     """Return the cells below `_PEAK`."""
     peak = None
     if quarters:
-        numbers = Counter(quarters.number(item.video, item.event.time) for item in passages)
-        peak = measures.peak_hour(quarters.periods, numbers)
+        periods = quarters.intervals.periods
+        numbers = {period.number: quarters.numbers[period.number, key, None] for period in periods}
+        peak = measures.peak_hour(periods, numbers)
     return [_time(peak.start), peak.vehicles, peak.factor] if peak else [None] * len(_PEAK)
 
 
-def _speeds(passages: Sequence[_Passage]) -> list[Cell]:
+def _speeds(events: Iterable[GroupedEvent]) -> list[Cell]:
     """Return the cells below `_SPEEDS`."""
-    speeds = [item.event.speed for item in passages if item.event.speed is not None]
+    speeds = [item.event.speed for item in events if item.event.speed is not None]
     quantiles: list[Cell] = np.quantile(speeds, [0.5, 0.85]).round(1).tolist() if speeds else []
     return quantiles or [None] * len(_SPEEDS)
 
