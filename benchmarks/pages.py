@@ -28,7 +28,7 @@ from benchmarks.pole_cameras import HEIGHT, WIDTH
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.media import VideoInfo
-from vdet.pages.batch import VehicleRow, VideoFacts, write_index
+from vdet.pages.batch import write_index
 from vdet.pages.drawing import Drawing
 from vdet.pages.render import jpeg_uri
 from vdet.pages.video import VideoPage
@@ -122,22 +122,35 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
     rng = np.random.default_rng(1)
     still, written = jpeg_uri(STILL), dict[str, dict[str, object]]()
     for number in range(videos):
-        rows = tuple(
-            VehicleRow(
-                id=n + 1,
-                class_name=CLASSES[rng.integers(len(CLASSES))],
-                first=round(float(600 * rng.random()), 3),
-                seconds=round(float(20 * rng.random()), 1),
-                clock=f"2026-05-{number % 28 + 1:02}T{number % 24:02}:30:07+02:00",
-                speed=round(float(90 * rng.random()), 1),
-                lines=("", "north → south", "south → north")[rng.integers(3)],
-            )
+        unknown = dict.fromkeys(("distance", "lane"))
+        empty = dict.fromkeys(("motion", "side", "size", "picture", "clip"), "")
+        rows = [
+            {
+                "id": n + 1,
+                "class_name": CLASSES[rng.integers(len(CLASSES))],
+                "first": round(float(600 * rng.random()), 3),
+                "seconds": round(float(20 * rng.random()), 1),
+                "clock": f"2026-05-{number % 28 + 1:02}T{number % 24:02}:30:07+02:00",
+                "speed": round(float(90 * rng.random()), 1),
+                "lines": ("", "north → south", "south → north")[rng.integers(3)],
+                **unknown,
+                **empty,
+            }
             for n in range(each)
-        )
-        facts = VideoFacts(
-            seconds=600, frames=15000, vehicles=each, max_at_once=3, still=still, rows=rows
-        )
-        summary = {"page": f"clip{number:05}.page/page.html", **facts.model_dump()}
+        ]
+        summary = {
+            "page": f"clip{number:05}.page/page.html",
+            "start": 0.0,
+            "seconds": 600,
+            "frames": 15000,
+            "vehicles": each,
+            "max_at_once": 3,
+            "still": still,
+            "counts": {},
+            "conditions": [],
+            "rows": rows,
+            "review": "",
+        }
         written[f"day{number // 100}/clip{number:05}"] = summary
     write_index(written, path)
 

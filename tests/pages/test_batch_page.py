@@ -8,18 +8,22 @@ import pytest
 
 from browser import browser
 from pages.html import Elements, needs_chromium, title_in_chromium
-from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts, write_index
+from vdet.pages.batch import NO_STILL, Row, write_index
 
 NASTY = "</script><b>"
 
 
-def facts(*rows: VehicleRow, start: float = 0.0) -> VideoFacts:
+def facts(*rows: Row, start: float = 0.0) -> dict[str, Any]:
     numbers = {"seconds": 2.08, "frames": 52, "vehicles": len(rows), "max_at_once": 1}
-    return VideoFacts(start=start, **numbers, still=NO_STILL, rows=rows)
+    named = {"counts": {}, "conditions": [], "review": ""}
+    return {"start": start, **numbers, **named, "still": NO_STILL, "rows": rows}
 
 
-def row(number: int, kind: str | None, first: float, **more: Any) -> VehicleRow:
-    return VehicleRow(id=number, class_name=kind, first=first, seconds=1.5, **more)
+def row(number: int, kind: str | None, first: float, **more: Any) -> Row:
+    unknown = dict.fromkeys(("clock", "speed", "distance", "lane"))
+    empty = dict.fromkeys(("lines", "motion", "side", "size", "picture", "clip"), "")
+    known = {"id": number, "class_name": kind, "first": first, "seconds": 1.5}
+    return {**unknown, **empty, **known, **more}
 
 
 VIDEOS = {
@@ -42,10 +46,10 @@ VIDEOS = {
 }
 
 
-def index(folder: Path, videos: dict[str, VideoFacts], **failed: str) -> str:
+def index(folder: Path, videos: dict[str, dict[str, Any]], **failed: str) -> str:
     """Write the page over these videos, and return it."""
     summaries = {
-        name: {"page": f"{Path(name).name}.page/page.html", **found.model_dump()}
+        name: {"page": f"{Path(name).name}.page/page.html", **found}
         for name, found in videos.items()
     }
     errors = {name: {"error": error} for name, error in failed.items()}
@@ -109,7 +113,7 @@ def test_failures_and_doubts_are_in_sight(tmp_path: Path, width: int) -> None:
     doubts = "dark from 0:00 to 1:00: of 10 vehicles, 6 are found", "drops from 0:00 to 1:00"
     videos = {f"NO20261127-17{number:02}00-F": facts() for number in range(11)}
     names = list(videos)[3::4]
-    videos |= {name: facts().model_copy(update={"conditions": doubts}) for name in names}
+    videos |= {name: facts() | {"conditions": doubts} for name in names}
     index(tmp_path, videos, **{"NO20261127-180000-F": "in/NO20261127-180000-F.mp4: is not a video"})
     with browser(tmp_path, width, 800, touch=width < 500) as window:
         window.visit(tmp_path / "index.html")
@@ -213,7 +217,7 @@ dispatchEvent(new Event("afterprint"));
 seen.after = state();
 """
     rows = [row(number, "car", number) for number in range(2500)]
-    long = [item.model_copy(update={"seconds": 3.0}) for item in rows[:300]]
+    long = [{**item, "seconds": 3.0} for item in rows[:300]]
     html = index(tmp_path, {"a": facts(*rows, *long)})
     assert seen(html, acts, tmp_path) == {
         "screen": [100, "101–200 of 2,800", []],

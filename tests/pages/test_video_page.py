@@ -18,7 +18,6 @@ from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.findings import Finding
-from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.track.track import FrameTracks
@@ -206,24 +205,25 @@ class TestVideoPage:
         html.encode("utf-8")
 
 
-def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
+def test_the_summary_has_the_counts_and_a_row_for_each_vehicle() -> None:
     counts = counted(("north", "in", 1, 1), ("south", "in", 2, 1), *[("</script><b>", "in", 1)] * 8)
     clock = Clock(datetime(2026, 5, 1, 7, tzinfo=UTC), "as given", UTC)
     known = {1: "../a.crops/vehicle-0001.jpg"}
-    facts = replace(page(), survey=survey(counts), clock=clock, pictures=known).facts
-    assert (facts.frames, facts.vehicles, facts.max_at_once) == (52, 2, 1)
-    assert facts.counts == {"north: in": 1, "south: in": 1, "</script><b>: in": 8}
-    assert facts.rows == (
-        VehicleRow(
-            id=1, class_name=None, first=0.0, seconds=2.0, clock="2026-05-01T07:00:00+00:00",
-            lines="north → south", side="left", size="near",
-            picture="../a.crops/vehicle-0001.jpg",
-        ),
-        VehicleRow(
-            id=2, class_name="truck", first=2.0, seconds=0.1, clock="2026-05-01T07:00:02+00:00",
-            side="left", size="far",
-        ),
-    )  # fmt: skip
+    summary = replace(page(), survey=survey(counts), clock=clock, pictures=known).summary
+    assert [summary[name] for name in ("frames", "vehicles", "max_at_once")] == [52, 2, 1]
+    assert summary["counts"] == {"north: in": 1, "south: in": 1, "</script><b>: in": 8}
+    nothing = dict.fromkeys(("speed", "distance", "lane")) | {"motion": "", "clip": ""}
+    assert summary["rows"] == [
+        nothing | {
+            "id": 1, "class_name": None, "first": 0.0, "seconds": 2.0, "side": "left",
+            "clock": "2026-05-01T07:00:00+00:00", "lines": "north → south", "size": "near",
+            "picture": "../a.crops/vehicle-0001.jpg",
+        },
+        nothing | {
+            "id": 2, "class_name": "truck", "first": 2.0, "seconds": 0.1, "side": "left",
+            "clock": "2026-05-01T07:00:02+00:00", "lines": "", "size": "far", "picture": "",
+        },
+    ]  # fmt: skip
 
 
 class TestFindings:
@@ -240,7 +240,7 @@ class TestFindings:
         made = replace(page(), records=[replace(TWO[0], motion="drove"), *stood[1:]])
         assert "1vehicle" in seen(made).text
         assert "1standing" in seen(made).text
-        assert made.facts.vehicles == 1
+        assert made.summary["vehicles"] == 1
 
 
 @needs_chromium

@@ -246,6 +246,7 @@ class TestFiles:
             "matrix": {"east": {"east": 0, "(none)": 1}},
             "begin": "2026-05-01 07:04:57.000+02:00",
             "warnings": [],
+            "notes": [],
         }  # fmt: skip
 
     def test_counts_have_tables_of_totals_and_of_zones(self, tmp_path: Path) -> None:

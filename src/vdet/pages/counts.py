@@ -2,6 +2,7 @@
 
 from collections import Counter
 from datetime import datetime
+from itertools import product
 
 from vdet.boxes import Image
 from vdet.pages.charts import Plot, interval_plot, time_axis
@@ -43,13 +44,10 @@ def _plot(survey: Survey, length: int) -> Plot | None:
     tally = survey.groups.tally(directions, length)
     periods = tally.intervals.periods
     first, last = periods[0], periods[-1]
-    series: dict[str, Counter[float]] = {
-        ": ".join(key): +Counter(
-            {item.number - first.number: tally.numbers[item.number, key, None] for item in periods}
-        )
-        for key in directions
-        if key[0] in names
-    }
+    series = {": ".join(key): Counter[float]() for key in directions if key[0] in names}
+    for key, period in product(directions, periods):
+        if key[0] in names and (count := tally.numbers[period.number, key, None]):
+            series[": ".join(key)][period.number - first.number] = count
     if not any(series.values()):
         return None
     zero = None

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN
@@ -12,14 +13,13 @@ from vdet.errors import plural
 from vdet.findings import Finding
 from vdet.media import VideoInfo
 from vdet.pages import charts
-from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts, VideoRows, table_json
+from vdet.pages.batch import NO_STILL, Row, VideoRows, table_json
 from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
 from vdet.pages.render import jpeg_uri, render
 from vdet.pages.traffic import page_table, path_marks, scene_picture, with_marks
 from vdet.traffic.clock import Clock, Intervals, Span
 from vdet.traffic.counts import Counts
-from vdet.traffic.records import VehicleRecord
-from vdet.traffic.speeds import KMH
+from vdet.traffic.records import COLUMNS, VehicleRecord
 from vdet.traffic.survey import Survey
 
 _MAX_VEHICLES = 300  # in the timeline, and with pictures
@@ -107,20 +107,20 @@ class VideoPage:
         return self.survey.counts[0] if self.survey else None
 
     @property
-    def facts(self) -> VideoFacts:
-        """The key figures of the video."""
-        return VideoFacts(
-            start=self.player.start if self.player else 0.0,
-            seconds=max(0.0, self.seconds),
-            frames=self.frames,
-            vehicles=len(self._moved),
-            max_at_once=self._max_at_once,
-            still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
-            counts=self._totals,
-            conditions=tuple(item.text for item in self.findings if item.severity == "warning"),
-            rows=self._rows(self.pictures),
-            review=self.review,
-        )
+    def summary(self) -> dict[str, Any]:
+        """What the page over many videos shows of this one, as values for JSON."""
+        return {
+            "start": self.player.start if self.player else 0.0,
+            "seconds": max(0.0, self.seconds),
+            "frames": self.frames,
+            "vehicles": len(self._moved),
+            "max_at_once": self._max_at_once,
+            "still": NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
+            "counts": self._totals,
+            "conditions": [item.text for item in self.findings if item.severity == "warning"],
+            "rows": self._rows(self.pictures),
+            "review": self.review,
+        }
 
     @property
     def _moved(self) -> list[VehicleRecord]:
@@ -139,30 +139,27 @@ class VideoPage:
         totals = self.counts.totals if self.counts else ()
         return {f"{total.name}: {total.direction}": total.count for total in totals if total.count}
 
-    def _rows(self, pictures: Mapping[int, str]) -> tuple[VehicleRow, ...]:
+    def _rows(self, pictures: Mapping[int, str]) -> list[Row]:
         """Return the rows of the table; `pictures` has addresses of images by vehicle id."""
         lines: dict[int, dict[str, None]] = {}
         for event in self.counts.events if self.counts else ():
             lines.setdefault(event.id, {})[event.name] = None
-        return tuple(
-            VehicleRow(
-                id=record.id,
-                class_name=record.class_name,
-                first=round(record.first, 3),
-                seconds=round(record.seconds, 1),
-                clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
-                speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
-                lines=" → ".join(lines.get(record.id, ())),
-                motion=record.motion or "",
-                distance=None if record.distance is None else round(record.distance, 1),
-                lane=record.lane,
-                side=_SIDES[min(2, int(3 * record.largest.center[0] / record.frame_width))],
-                size="near" if record.largest.width > _NEAR * record.frame_width else "far",
-                picture=pictures.get(record.id, ""),
-                clip=self.clips.get(record.id, ""),
-            )
+        return [
+            {
+                **{name: COLUMNS[name](record) for name in ("id", "speed", "distance", "lane")},
+                "class_name": record.class_name,
+                "first": round(record.first, 3),
+                "seconds": round(record.seconds, 1),
+                "clock": self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
+                "lines": " → ".join(lines.get(record.id, ())),
+                "motion": record.motion or "",
+                "side": _SIDES[min(2, int(3 * record.largest.center[0] / record.frame_width))],
+                "size": "near" if record.largest.width > _NEAR * record.frame_width else "far",
+                "picture": pictures.get(record.id, ""),
+                "clip": self.clips.get(record.id, ""),
+            }
             for record in self.records
-        )
+        ]
 
     def html(self) -> str:
         """Return the page; it loads only the video."""

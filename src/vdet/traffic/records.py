@@ -204,7 +204,7 @@ class VehicleRecords:
             self._vehicles[track.id].seconds += self._period
 
 
-_COLUMNS: dict[str, Callable[[VehicleRecord], Any]] = {
+COLUMNS: dict[str, Callable[[VehicleRecord], Any]] = {
     "id": lambda record: record.id,
     "class": lambda record: record.class_name,
     "clock": lambda _: None,  # filled in if the clock is known
@@ -245,7 +245,7 @@ def records_content(
     """Return the content of the file `path`, for `write_content`."""
     if is_json(path):
         return [_item(record, clock) for record in records]
-    return [tuple(_COLUMNS), *(list(_row(record, clock).values()) for record in records)]
+    return [tuple(COLUMNS), *(list(_row(record, clock).values()) for record in records)]
 
 
 def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
@@ -255,12 +255,12 @@ def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
         write_content(target, items)
     else:
         rows = [[name, *row] for name, (_, *body) in videos.items() for row in body]
-        write_content(target, [[VIDEO, *_COLUMNS], *rows])
+        write_content(target, [[VIDEO, *COLUMNS], *rows])
 
 
 def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     """Return the values of a record by column."""
-    row = {name: value(record) for name, value in _COLUMNS.items()}
+    row = {name: value(record) for name, value in COLUMNS.items()}
     return row | {"clock": plain_time(clock and clock.at(round(record.first, 3)))}
 
 

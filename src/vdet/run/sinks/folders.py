@@ -148,7 +148,7 @@ class PageSink(BaseSink):
         """Write the page."""
         self._keep(self.context.crops.end())
         page = self._page()
-        self.summary = {"page": f"{self.path.name}/{PAGE_NAME}", **page.facts.model_dump()}
+        self.summary = {"page": f"{self.path.name}/{PAGE_NAME}", **page.summary}
         write_text(self._file, page.html())
 
     def write(self, result: FrameResult) -> None:
