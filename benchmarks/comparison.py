@@ -8,7 +8,7 @@ page has the commands of the other programs. F1 on held-out cameras is not measu
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import fmean
@@ -26,6 +26,7 @@ from vdet.run.result import FrameResult
 from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Scene, SceneVehicle, pole_scene
 from vdet.synthetic.truth import write_truth
+from vdet.track.track import Track
 
 SEEDS = (1, 2, 3, 4)
 LINES = (
@@ -99,7 +100,7 @@ def crossings_of(tracks: Sequence[Any], scene: Scene, **options: Any) -> int:
 def _labels(frames: Sequence[vdet.Boxes]) -> SavedTracks:
     return SavedTracks(
         tuple(
-            Label(0, astuple(box.box), frame=number, id=box.id or 0, score=box.score)
+            Label(Track(box.id or 0, box.box, box.score, "detected"), frame=number)
             for number, boxes in enumerate(frames)
             for box in boxes
         )

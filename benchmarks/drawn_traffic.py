@@ -1,7 +1,7 @@
 """Drawn roads with traffic in every lane: their views, what is shown of them, and the truth."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -30,6 +30,7 @@ from vdet.synthetic.scene import (
 )
 from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.synthetic.vehicle import STANDS
+from vdet.track.track import Track
 
 
 def traffic_scene(
@@ -121,7 +122,7 @@ def true_labels(scene: Scene, indices: Iterable[int]) -> SavedTracks:
 
 
 def _label(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
-    return Label(0, astuple(box), frame=index, id=number, ignored=ignored)
+    return Label(Track(number, box, 1.0, "detected"), frame=index, ignored=ignored)
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from sklearn.linear_model import LogisticRegression
 from benchmarks import conditions
 from benchmarks.conditions import CHANGES
 from benchmarks.unseen import deal
-from vdet.boxes import Box, Float64Array, Int64Array
+from vdet.boxes import Float64Array, Int64Array
 from vdet.conditions import visibility
 from vdet.conditions.visibility import PLAIN, probability
 from vdet.conditions.watch import planes_of
@@ -161,11 +161,11 @@ def _both(
     """Yield the picture as it is and changed, if it has vehicles."""
     image = labelled.read()
     truth = [
-        Box(*label.box)
+        label.track.box
         for label in labelled.labels
-        if label.name in _VEHICLES
+        if label.track.class_name in _VEHICLES
         and not label.ignored
-        and label.box[2] - label.box[0] >= _SMALLEST * image.shape[1]
+        and label.track.box.width >= _SMALLEST * image.shape[1]
     ]
     if not truth:
         return

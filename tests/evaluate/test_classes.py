@@ -6,17 +6,21 @@ from pathlib import Path
 import numpy as np
 
 from evaluate.scenes import TEN, drive, video
-from vdet.boxes import Boxes
+from vdet.boxes import Box, Boxes
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.images import Counting, MeasuredImage
 from vdet.evaluate.scores import ClassResult, class_results
 from vdet.labels.images import LabelledImage
 from vdet.labels.label import Label
+from vdet.track.track import Track
 
 
 def test_vehicles_of_a_picture_are_counted_by_their_class_and_that_of_their_detection() -> None:
     places, true = [(x, 0, x + 100, 100) for x in range(0, 800, 200)], ["car", "truck", "truck"]
-    labels = [Label(0, box, name) for box, name in zip(places, [*true, "vehicle"], strict=True)]
+    labels = [
+        Label(Track(0, Box(*box), 1.0, "detected", name))
+        for box, name in zip(places, [*true, "vehicle"], strict=True)
+    ]
     picture = LabelledImage(Path("a.png"), Path("a.txt"), tuple(labels))
     boxes = np.array([*places[:2], places[3], (900, 0, 999, 100)])
     found = Boxes(boxes, [0.9] * 4, classes=[0, 0, 1, 1], names=["car", "truck"])
@@ -28,7 +32,7 @@ def test_vehicles_of_a_picture_are_counted_by_their_class_and_that_of_their_dete
 
 
 def named(name: str, *tracks: list[Label]) -> list[Label]:
-    return [label._replace(name=name) for track in tracks for label in track]
+    return [label.named(name) for track in tracks for label in track]
 
 
 def test_a_vehicle_of_a_video_has_the_last_class_of_the_track_that_finds_it_most() -> None:

@@ -1,6 +1,6 @@
 """Scores of pictures, with boxes whose matches are known by eye."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vdet.boxes import Boxes
+from vdet.boxes import Box, Boxes
 from vdet.evaluate.images import (
     Counting,
     ImageScores,
@@ -18,16 +18,14 @@ from vdet.evaluate.images import (
 )
 from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import Label
+from vdet.track.track import Track
 
 PLAIN = Counting(score=0.5, min_width=0)
 WIDTH = 1000
 
 
-def at(x: float, width: float = 100) -> "Box":
-    return x, 0, x + width, 100
-
-
-Box = tuple[float, float, float, float]
+def at(x: float, width: float = 100) -> Box:
+    return Box(x, 0, x + width, 100)
 
 
 @dataclass(frozen=True)
@@ -40,10 +38,11 @@ class Searched:
 
     def measured(self, counting: Counting) -> MeasuredImage:
         labels = (
-            Label(row, box, "car", ignored=row in self.ignored) for row, box in enumerate(self.true)
+            Label(Track(0, box, 1.0, "detected", "car"), ignored=row in self.ignored)
+            for row, box in enumerate(self.true)
         )
         picture = LabelledImage(Path("a.png"), Path("a.txt"), tuple(labels))
-        boxes = np.array([box for _, box in self.found]).reshape(-1, 4)
+        boxes = np.array([astuple(box) for _, box in self.found]).reshape(-1, 4)
         scores = np.array([score for score, _ in self.found])
         return MeasuredImage.of(picture, WIDTH, Boxes(boxes, scores), counting)
 
@@ -115,7 +114,7 @@ class TestBestF1:
     @settings(max_examples=50)
     @given(st.lists(lists, min_size=1, max_size=3))
     def test_it_is_the_f1_at_its_score_and_none_shown_is_better(
-        self, pictures: list[list[tuple[float, tuple[float, float, float, float]]]]
+        self, pictures: list[list[tuple[float, Box]]]
     ) -> None:
         searched_ones = [Searched([at(0), at(130), at(300)], found) for found in pictures]
         result = scores(*searched_ones)

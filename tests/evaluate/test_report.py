@@ -1,5 +1,6 @@
 """How results are shown: what stands in tables, values and pages, not how it looks."""
 
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from evaluate.scenes import TEN, drive, video
 from labels.saving import checked_video, row
 from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
-from vdet.boxes import Boxes
+from vdet.boxes import Box, Boxes
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, MeasuredSet
 from vdet.evaluate.output import RunName
@@ -22,7 +23,7 @@ from vdet.evaluate.report import (
     worst_tiles,
 )
 from vdet.evaluate.video import ClipResult, score_files
-from vdet.labels.label import Label, from_size
+from vdet.labels.label import Label
 from vdet.labels.reading import read_labelled_images
 
 NAME = RunName("svm", None, None, ("b=1",))
@@ -31,8 +32,8 @@ NAME = RunName("svm", None, None, ("b=1",))
 class TestVideo:
     def clips(self, *found: range) -> list[ClipResult]:
         """Return as many clips; in each the vehicle is found in these of ten frames."""
-        truth = video([label._replace(name="car") for label in drive(1, TEN)])
-        tracks = [[item._replace(name="bus") for item in drive(1, frames)] for frames in found]
+        truth = video([label.named("car") for label in drive(1, TEN)])
+        tracks = [[item.named("bus") for item in drive(1, frames)] for frames in found]
         comparisons = [compare(video(track), truth) for track in tracks]
         return [ClipResult(f"clip {n}", one, 10) for n, one in enumerate(comparisons)]
 
@@ -98,7 +99,7 @@ class TestPictures:
         cow = Boxed("cow", (0, 0, 5, 5))
         pictures = {"a": Labelled(100, 60, (self.CAR, cow)), "b": Labelled(100, 60)}
         labelled = read_labelled_images(write_coco(folder, pictures))
-        boxes = np.array([from_size(*box) for box in found], np.float64).reshape(-1, 4)
+        boxes = np.array([astuple(Box.sized(*box)) for box in found], np.float64).reshape(-1, 4)
         shown = Boxes(boxes, np.full(len(found), 0.9))
         images = [
             MeasuredImage.of(picture, 100, shown, self.COUNTING) for picture in labelled.images

@@ -12,7 +12,6 @@ from vdet.labels.label import (
     SavedTracks,
     SourceVideo,
     checked_labels,
-    from_size,
 )
 from vdet.labels.reading import read_tracks
 from vdet.track.track import FrameTracks, Track
@@ -33,8 +32,9 @@ def row(
     **known: Any,
 ) -> Label:
     """Return a label by the number of its frame, from 0, its id and its size."""
-    box = from_size(x, y, width, height)
-    return Label(place, box, frame=number, id=id_, score=score, **known)
+    ignored, name = known.get("ignored", False), known.get("name")
+    track = Track(id_, Box.sized(x, y, width, height), score, "detected", name)
+    return Label(track, place, number, ignored)
 
 
 def checked_video(rows: Iterable[Label], path: Path = Path("scene")) -> SavedTracks:

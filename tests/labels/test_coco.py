@@ -1,4 +1,5 @@
 import json
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,7 @@ def test_tracks_that_cvat_exports_are_read() -> None:
     saved = read_coco(FILE, exported({0: [7], 5: [], 10: [7, 8]}))
     assert saved.covered == (0, 5, 10)
     assert saved.size == (300, 200)
-    assert [(row.frame, row.id, row.box) for row in saved.labels] == [
+    assert [(row.frame, row.track.id, astuple(row.track.box)) for row in saved.labels] == [
         *((0, 7, (1, 1, 9, 9)), (10, 7, (1, 1, 9, 9)), (10, 8, (1, 1, 9, 9)))
     ]
 

@@ -1,3 +1,4 @@
+from dataclasses import astuple
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ def test_truth_with_spaces_is_read_and_several_classes_are_named(
 ) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1 7 11 21 20 10 1 4 0 0\n1 8 1 1 9 9 1 1 0 0\n1 9 1 1 9 9 0 0 0 0\n")
-    boxes = [label.box for label in read_truth(path).labels]
+    boxes = [astuple(label.track.box) for label in read_truth(path).labels]
     assert boxes == [(10, 20, 30, 30), (0, 0, 9, 9), (0, 0, 9, 9)]
     text = "column 8 has the classes 1, 4, which are all read as vehicles"
     assert caplog.messages == [f"{path}: {text}; keep only the rows of vehicles"]
@@ -31,7 +32,9 @@ def test_truth_of_uavdt_has_vehicles_partly_outside_and_a_file_of_ignore_regions
     path, regions = tmp_path / "M01_gt_whole.txt", tmp_path / "M01_gt_ignore.txt"
     path.write_text("1,7,11,21,20,10,2,1,1\n1,8,1,1,9,9,3,1,3\n")
     regions.write_text("1,7,101,1,50,50,1,-1,-1\n")
-    found = [(label.id, label.box[0], label.ignored) for label in read_truth(path).labels]
+    found = [
+        (label.track.id, label.track.box.x1, label.ignored) for label in read_truth(path).labels
+    ]
     assert found == [(7, 10, False), (8, 0, False), (-1, 100, True)]
     assert caplog.messages == []
     path.write_text("1,7,11,21,20,10,0,-1,-1,-1\n")
@@ -47,7 +50,7 @@ def test_tracks_are_written_without_a_heading() -> None:
 def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1,7,1,1,20,10,0,3,1\n1,8,1,1,20,10,1,3,1\n")
-    assert [row.id for row in read_tracks(path).labels] == [8]
+    assert [row.track.id for row in read_tracks(path).labels] == [8]
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
     path = tmp_path / name
     path.write_bytes(written(form, [frame(2, car(5))]))
     (row,) = read_tracks(path).labels
-    assert (row.frame, row.id) == (2, 5)
+    assert (row.frame, row.track.id) == (2, 5)
 
 
 @pytest.mark.parametrize(

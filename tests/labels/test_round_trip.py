@@ -172,7 +172,9 @@ def test_labels_of_pictures_are_read_again(pictures: list[ImageTracks]) -> None:
         for picture in pictures
     }
     read = {
-        picture.path: sorted((Box(*label.box).pixels, label.name) for label in picture.labels)
+        picture.path: sorted(
+            (label.track.box.pixels, label.track.class_name) for label in picture.labels
+        )
         for picture in found
     }
     assert read == expected

@@ -145,8 +145,8 @@ def compare_frames(
     frames = []
     for number, (vehicles, tracks) in zip(numbers, counting, strict=True):
         if vehicles or tracks:
-            of_vehicles = np.searchsorted(vehicle_ids, [vehicle.id for vehicle in vehicles])
-            of_tracks = np.searchsorted(track_ids, [track.id for track in tracks])
+            of_vehicles = np.searchsorted(vehicle_ids, [vehicle.track.id for vehicle in vehicles])
+            of_tracks = np.searchsorted(track_ids, [label.track.id for label in tracks])
             vehicle_boxes, track_boxes = boxes_of(vehicles), boxes_of(tracks)
             iou = iou_matrix(vehicle_boxes, track_boxes)
             together = partners[of_vehicles][:, np.newaxis] == of_tracks
@@ -158,7 +158,7 @@ def compare_frames(
                 tracks=of_tracks,
                 vehicle_boxes=vehicle_boxes,
                 track_boxes=track_boxes,
-                scores=np.array([track.score for track in tracks], np.float64),
+                scores=np.array([label.track.score for label in tracks], np.float64),
                 iou=iou,
                 rows=rows,
                 columns=columns,
@@ -241,10 +241,10 @@ def assign(values: Float64Array) -> tuple[Int64Array, Int64Array]:
 
 def _ids(labels: Iterable[Label]) -> Int64Array:
     """Return the ids of labels, each once, ascending."""
-    return np.unique(np.array([label.id for label in labels], np.int64))
+    return np.unique(np.array([label.track.id for label in labels], np.int64))
 
 
 def _names(ids: Int64Array, labels: Iterable[Label]) -> tuple[str, ...]:
     """Return the last class of each id in the labels."""
-    names = {label.id: label.name for label in labels if label.name}
+    names = {x.track.id: x.track.class_name for x in labels if x.track.class_name}
     return tuple(names.get(id_, UNKNOWN) for id_ in ids.tolist())

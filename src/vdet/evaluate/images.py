@@ -1,7 +1,7 @@
 """Scores of a detector in labelled images: at one score threshold and at all."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import compress
 from statistics import fmean
@@ -19,6 +19,7 @@ from vdet.labels.label import Label
 from vdet.progress import Progress, no_progress
 from vdet.run.images import ImageSearch
 from vdet.run.threads import SearchThreads
+from vdet.track.track import Track
 
 _MAX_DETECTIONS = 1000  # in an image, those of the highest scores
 
@@ -62,24 +63,25 @@ class MeasuredImage:
         """Compare the detections with the labels of an image, `width` pixels wide."""
         minimum = counting.min_width * width
         truth = [
-            label._replace(id=number, ignored=label.ignored or _width(label) < minimum)
+            Label(
+                replace(label.track, id=number),
+                ignored=label.ignored or label.track.box.width < minimum,
+            )
             for number, label in enumerate(image.labels)
         ]
         is_labelled = [name not in image.unlabelled for name in boxes.class_names]
         boxes = boxes[np.flatnonzero(is_labelled)]
         boxes = boxes[np.argsort(-boxes.scores, kind="stable")[:_MAX_DETECTIONS]]
         detected = [
-            Label(number, astuple(box.box), box.class_name, id=number, score=box.score)
-            for number, box in enumerate(boxes)
+            Label(
+                Track(number, found.box, found.score, "detected", found.class_name),
+                ignored=found.box.width < minimum,
+            )
+            for number, found in enumerate(boxes)
         ]
-        detected = [label._replace(ignored=_width(label) < minimum) for label in detected]
         shown = list(compress(detected, boxes.reach(counting.score, counting.scores)))
         every, counted = (compare_frames({0: labels}, {0: truth}) for labels in (detected, shown))
         return cls(image, every, counted)
-
-
-def _width(label: Label) -> float:
-    return label.box[2] - label.box[0]
 
 
 @dataclass(frozen=True)

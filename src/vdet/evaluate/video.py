@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import Comparison, compare, pool
@@ -112,9 +111,8 @@ def evaluate_video(
     with open_video(run, Parts(model), with_traffic=False) as opened:
         advance, info = progress("", opened.reader.expected), opened.reader.info
         for result in opened.results:
-            index = result.frame.index
             labels += [
-                Label(0, track.box.pixels, track.class_name, index, track.id, track.score)
+                Label(replace(track, box=track.box.rounded), frame=result.frame.index)
                 for track in result.tracks
             ]
             frames += 1
@@ -124,7 +122,7 @@ def evaluate_video(
     if settings.regions:
         regions = Regions(settings.regions, info.width, info.height)
         true_labels = [
-            label if regions.contains(Box.of(label.box).foot) else label._replace(ignored=True)
+            label if regions.contains(label.track.foot) else label._replace(ignored=True)
             for label in truth.labels
         ]
         truth = replace(truth, labels=tuple(true_labels))

@@ -30,7 +30,7 @@ from vdet.errors import TruthError
 from vdet.files import valid_text
 from vdet.labels.formats import Format, ImageTracks, last_classes
 from vdet.labels.images import LabelledImage, image_names, inside
-from vdet.labels.label import NO_ID, Label, SavedTracks, Size, SourceVideo, from_size, line_error
+from vdet.labels.label import NO_ID, Label, SavedTracks, Size, SourceVideo, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -41,7 +41,7 @@ from vdet.labels.parsing import (
     frame_number,
     read_bytes,
 )
-from vdet.track.track import FrameTracks
+from vdet.track.track import FrameTracks, Track
 
 _VIDEO = 1
 """Id of the only video."""
@@ -154,17 +154,15 @@ class _Annotation:
         attributes = self.attributes or _Attributes()
         id_ = attributes.track_id if self.track_id is None else self.track_id
         x, y, width, height = self.bbox
-        return Label(
-            position=position,
-            box=from_size(x, y, width, height),
-            name=name,
-            frame=frame,
-            id=id_ if isinstance(id_, int) and 0 <= id_ <= LIMIT else NO_ID,
-            score=self.score,
-            ignored=self.iscrowd,
-            foot=self.foot,
-            state="predicted" if attributes.occluded else "detected",
+        track = Track(
+            id_ if isinstance(id_, int) and 0 <= id_ <= LIMIT else NO_ID,
+            Box.sized(x, y, width, height),
+            self.score,
+            "predicted" if attributes.occluded else "detected",
+            name,
+            self.foot,
         )
+        return Label(track, position, frame, ignored=self.iscrowd)
 
 
 @_entry
@@ -257,7 +255,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     frames = {image.id: image.frame or 0 for image in document.images}
     labels = tuple(_labels(path, document, frames))
     if any(image.frame is None for image in document.images) or NO_ID in {
-        label.id for label in labels
+        label.track.id for label in labels
     }:
         raise TruthError(
             f"{path}: needs the frame_index of each image and the track_id of each annotation; in "

@@ -6,13 +6,13 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, unquote_plus
 
-from vdet.boxes import Image
+from vdet.boxes import Box, Image
 from vdet.errors import ImageError, TruthError, printable, quantity
-from vdet.labels.label import Corners, Label, Size, line_error, mistake_in_box
+from vdet.labels.label import Label, Size, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import read_image
 
@@ -34,7 +34,7 @@ class LabelledImage:
         The image file, and the file of its labels.
     labels
         From a reader: all labels of the file. In `LabelledImages`: only vehicles and ignore
-        regions, each with an area; `name` is a class of `Roles`.
+        regions, each with an area, named by a class of `Roles`.
     size
         Width and height of the image in pixels; None if the labels do not contain them.
     unlabelled
@@ -97,12 +97,15 @@ def checked_images(
     farthest, smallest = 0.0, math.inf
     for image in images:
         labels = tuple(
-            {(label.box, label.name, label.ignored): label for label in image.labels}.values()
+            {
+                (label.track.box, label.track.class_name, label.ignored): label
+                for label in image.labels
+            }.values()
         )
         boxes += len(labels)
         repeated += len(image.labels) - len(labels)
-        absurd += sum(_is_absurd(label.box, image.size) for label in labels)
-        farthest = max([farthest, *(max(label.box) for label in labels)])
+        absurd += sum(_is_absurd(label.track.box, image.size) for label in labels)
+        farthest = max([farthest, *(max(astuple(label.track.box)) for label in labels)])
         smallest = min(smallest, *(image.size or (0,)))
         if image.path in checked:
             raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
@@ -130,11 +133,13 @@ def checked_images(
     )
 
 
-def _is_absurd(box: Corners, size: Size | None) -> bool:
+def _is_absurd(box: Box, size: Size | None) -> bool:
     """Return whether a box cannot be in pixels: it has fractions, or two corners for its size."""
-    pairs = zip(box[:2], box[2:], size or (math.inf, math.inf), strict=True)
-    reaches_out = any(a < -_SLACK * side or b > side + _SLACK * side for a, b, side in pairs)
-    return reaches_out or max(box[2:]) <= 1
+    width, height = size or (math.inf, math.inf)
+    slack_x, slack_y = _SLACK * width, _SLACK * height
+    reaches_left = box.x1 < -slack_x or box.y1 < -slack_y
+    reaches_right = box.x2 > width + slack_x or box.y2 > height + slack_y
+    return reaches_left or reaches_right or max(box.x2, box.y2) <= 1
 
 
 def _with_roles(
@@ -144,16 +149,17 @@ def _with_roles(
     if not is_file(image.path):
         raise TruthError(f"{printable(str(image.path))}: not found, but {image.file} labels it")
     for label in image.labels:
-        name = label.name or ""
+        name = label.track.class_name or ""
         role = roles.role_of(name)
         if role not in ("vehicle", "ignored"):
             omitted[name] += 1
             continue
-        if mistake := mistake_in_box(label):
+        if mistake := mistake_in_box(label.track.box):
             raise line_error(image.file, label.position, mistake)
         ignored.update([name] if role == "ignored" and not label.ignored else [])
         is_ignored = label.ignored or role == "ignored"
-        yield label._replace(name=roles.class_of(name) or "vehicle", ignored=is_ignored)
+        named = label.named(roles.class_of(name) or "vehicle")
+        yield named._replace(ignored=is_ignored)
 
 
 def is_file(path: Path) -> bool:

@@ -20,62 +20,49 @@ from vdet.config.camera import EARLIEST, LATEST
 from vdet.config.classes import standard_class
 from vdet.errors import TruthError
 from vdet.findings import Finding
-from vdet.track.track import FrameTracks, State, Track
+from vdet.track.track import FrameTracks, Track
 
 NO_ID = -1
 """Id of a box without an id; in video, only ignore regions may have it."""
-
-Corners = tuple[float, float, float, float]
-"""x1, y1, x2, y2 in pixels from 0; the far sides are exclusive."""
 
 Size = tuple[int, int]
 """Width and height in pixels."""
 
 
 class Label(NamedTuple):
-    """A labelled box of a file.
+    """A track, or another box, as it stands in a file.
 
     There may be millions, and a frozen dataclass takes six times as long to make.
 
     Attributes
     ----------
+    track
+        Its `class_name` is its name in the file, and its `id` is `NO_ID` if it has none. Its score
+        is 1 if it has none, and may be any number in MOTChallenge.
     position
         Its line in the file, or a name of its position, such as "annotations.3".
-    box
-        x1, y1, x2, y2 in pixels of the frame from 0; the far sides are exclusive.
-    name
-        Its name in the file; None if the file has no names.
     frame
         Number of the frame, from 0; 0 in an image.
-    score
-        Confidence, higher is better; 1 where the file has none.
     ignored
         Whether it is an ignore region, not a vehicle.
-    state, foot, distance, lane
-        As in `vdet.track.track.Track`; None if the file does not have them.
     """
 
-    position: int | str
-    box: Corners
-    name: str | None = None
+    track: Track
+    position: int | str = 0
     frame: int = 0
-    id: int = NO_ID
-    score: float = 1.0
     ignored: bool = False
-    state: State = "detected"
-    foot: tuple[float, float] | None = None
-    distance: float | None = None
-    lane: int | None = None
 
-
-def from_size(x: float, y: float, width: float, height: float) -> Corners:
-    """Return the corners of a box from its top-left corner and its size."""
-    return x, y, x + width, y + height
+    def named(self, name: str | None, score: float | None = None) -> "Label":
+        """Return it with another name, and another score if one is given."""
+        track = self.track
+        score = track.score if score is None else score
+        return self._replace(track=replace(track, class_name=name, score=score))
 
 
 def boxes_of(labels: Iterable[Label]) -> Float64Array:
     """Return x1, y1, x2, y2 of labels in pixels from 0, float64 `(n, 4)`."""
-    return np.array([label.box for label in labels], np.float64).reshape(-1, 4)
+    boxes = (label.track.box for label in labels)
+    return np.array([(b.x1, b.y1, b.x2, b.y2) for b in boxes], np.float64).reshape(-1, 4)
 
 
 def line_error(path: Path | str, position: int | str, message: str) -> TruthError:
@@ -95,24 +82,23 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
     checked = tuple(labels)
     keys: set[tuple[int, int]] = set()
     for label in checked:
-        mistake = mistake_in_box(label)
-        key = label.frame, label.id
+        mistake, id_ = mistake_in_box(label.track.box), label.track.id
+        key = label.frame, id_
         if label.frame < 0:
             mistake = "the frame comes before the video's first"
-        elif label.id < (NO_ID if label.ignored else 0):
-            mistake = f"id {label.id} is negative; number the vehicles from 0 or 1"
-        elif key in keys and label.id != NO_ID:
-            mistake = f"id {label.id} occurs twice in the same frame"
+        elif id_ < (NO_ID if label.ignored else 0):
+            mistake = f"id {id_} is negative; number the vehicles from 0 or 1"
+        elif key in keys and id_ != NO_ID:
+            mistake = f"id {id_} occurs twice in the same frame"
         if mistake is not None:
             raise line_error(path, label.position, mistake)
         keys.add(key)
     return checked
 
 
-def mistake_in_box(label: Label) -> str | None:
-    """Return what is wrong with the box of a label; None if nothing is."""
-    x1, y1, x2, y2 = label.box
-    width, height = x2 - x1, y2 - y1
+def mistake_in_box(box: Box) -> str | None:
+    """Return what is wrong with a box; None if nothing is."""
+    width, height = box.x2 - box.x1, box.y2 - box.y1
     if width <= 0 or height <= 0 or width * height <= 0:
         return f"the box has no area: {width:g} wide, {height:g} high"
     return None
@@ -234,8 +220,8 @@ class SavedTracks:
         """
         frames = self.by_frame()
         for index in sorted(self._indices()):
-            labels = sorted(frames.get(index, ()), key=attrgetter("id"))
-            yield FrameTracks(index, self.times.get(index, math.nan), tuple(map(_track, labels)))
+            tracks = sorted((label.track for label in frames.get(index, ())), key=attrgetter("id"))
+            yield FrameTracks(index, self.times.get(index, math.nan), tuple(tracks))
 
     def by_frame(self) -> dict[int, list[Label]]:
         """Return the labels by the number of their frame, ascending.
@@ -244,12 +230,12 @@ class SavedTracks:
         """
         names = {
             name: name and (standard_class(name) or name)
-            for name in {label.name for label in self.labels}
+            for name in {label.track.class_name for label in self.labels}
         }
         frames: dict[int, list[Label]] = {}
         for label in sorted(self.labels, key=attrgetter("frame")):
-            name = names[label.name]
-            named = label if name == label.name else label._replace(name=name)
+            name = names[label.track.class_name]
+            named = label if name == label.track.class_name else label.named(name)
             frames.setdefault(label.frame, []).append(named)
         return frames
 
@@ -283,17 +269,3 @@ class SavedTracks:
 
     def _indices(self) -> set[int]:
         return {label.frame for label in self.labels}.union(self.covered or ())
-
-
-def _track(label: Label) -> Track:
-    x1, y1, x2, y2 = [math.floor(side + 0.5) for side in label.box]  # as `Box.xywh`, but faster
-    return Track(
-        id=label.id,
-        box=Box(x1, y1, max(x1 + 1, x2), max(y1 + 1, y2)),
-        score=min(max(label.score, 0.0), 1.0),
-        state=label.state,
-        class_name=label.name,
-        whole_foot=label.foot,
-        distance=label.distance,
-        lane=label.lane,
-    )

@@ -19,12 +19,13 @@ from typing import Annotated, Any, TypeVar
 from pydantic import FailFast, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
+from vdet.boxes import Box
 from vdet.config.camera import parse_date_time
 from vdet.errors import TruthError
 from vdet.files import json_line
 from vdet.findings import Finding
 from vdet.labels.formats import VIDEO, Format
-from vdet.labels.label import Label, SavedTracks, SourceVideo, from_size, line_error
+from vdet.labels.label import Label, SavedTracks, SourceVideo, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -68,18 +69,17 @@ class _Box:
 
     def label(self, line: int, frame: int) -> Label:
         """Return the box as a label of a frame."""
-        return Label(
-            position=line,
-            box=from_size(self.x, self.y, self.width, self.height),
-            name=self.class_name,
-            frame=frame,
-            id=self.id,
-            score=1.0 if self.score is None else self.score,
-            state=self.state or "detected",
-            foot=self.foot,
-            distance=self.distance,
-            lane=self.lane,
+        track = Track(
+            self.id,
+            Box.sized(self.x, self.y, self.width, self.height),
+            1.0 if self.score is None else self.score,
+            self.state or "detected",
+            self.class_name,
+            self.foot,
+            self.distance,
+            self.lane,
         )
+        return Label(track, line, frame)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -334,14 +334,9 @@ def _mot_labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
             raise line_error(path, line, f"{message}; a results file needs ten columns")
         if row.score and columns[7].strip().isdecimal():
             classes.add(columns[7].strip())
-        yield Label(
-            position=line,
-            box=from_size(row.left - 1, row.top - 1, row.width, row.height),
-            frame=row.frame - 1,
-            id=row.id,
-            score=1.0 if is_truth else row.score,
-            ignored=is_truth and row.score == 0,
-        )
+        box = Box.sized(row.left - 1, row.top - 1, row.width, row.height)
+        track = Track(row.id, box, 1.0 if is_truth else row.score, "detected")
+        yield Label(track, line, row.frame - 1, ignored=is_truth and row.score == 0)
 
 
 MOT = Format("MOTChallenge", ".txt", read_mot, _mot_lines)

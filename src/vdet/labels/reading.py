@@ -45,8 +45,12 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
     gc.disable()  # labels have no cycles, and looking for some takes a quarter of the time
     try:
         saved = recognize(path, data).read(path, data)
-        regions = set(filter(is_region, {label.name for label in saved.labels}))
-        vehicles = [label for label in saved.labels if not (label.ignored or label.name in regions)]
+        regions = set(filter(is_region, {label.track.class_name for label in saved.labels}))
+        vehicles = [
+            label if 0 <= label.track.score <= 1 else _with_score(label)
+            for label in saved.labels
+            if not (label.ignored or label.track.class_name in regions)
+        ]
         saved = replace(saved, labels=checked_labels(path, vehicles))
     finally:
         if was_enabled:
@@ -56,6 +60,11 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
         fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
         raise TruthError(f"{path}: {fault}")
     return saved if rate is None else saved.at_rate(rate)
+
+
+def _with_score(label: Label) -> Label:
+    """Return a label with the nearest score from 0 to 1."""
+    return label.named(label.track.class_name, min(max(label.track.score, 0.0), 1.0))
 
 
 _HEAD_LINES, _MAX_LINE = 3, 1_000_000
@@ -104,11 +113,13 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:
     saved = form.read(path, data)
     labels: Iterable[Label] = saved.labels
     if form is MOT:  # in the older variant, the score is the flag
-        labels = [label._replace(ignored=label.score == 0 or label.ignored) for label in labels]
+        labels = [
+            label._replace(ignored=label.track.score == 0 or label.ignored) for label in labels
+        ]
         regions = path.with_stem(re.sub(r"_gt(_whole)?$", "_gt_ignore", path.stem))
         if regions != path and regions.is_file():
             more = form.read(regions, read_bytes(regions)).labels
-            labels += (label._replace(id=NO_ID, ignored=True) for label in more)
+            labels += (Label(replace(x.track, id=NO_ID), x.position, x.frame, True) for x in more)
     checked = checked_labels(path, _with_roles(path, labels, roles))
     if checked and all(label.ignored for label in checked):
         flags = "; column 7 is 0 in all lines" if form is MOT else ""
@@ -119,14 +130,14 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:
     """Yield vehicles and ignore regions; the name of each is the class of its label."""
     for label in labels:
-        role = "vehicle" if label.name is None else roles.role_of(label.name)
+        name = label.track.class_name
+        role = "vehicle" if name is None else roles.role_of(name)
         if role is None:
-            message = f"label {label.name!r:.40} is unknown; set its role in labels.roles"
+            message = f"label {name!r:.40} is unknown; set its role in labels.roles"
             raise line_error(path, label.position, message)
         if role != "other":
-            name = label.name and (roles.class_of(label.name) or "vehicle")
-            ignored = label.ignored or role == "ignored"
-            yield label._replace(name=name, score=1.0, ignored=ignored)
+            named = label.named(name and (roles.class_of(name) or "vehicle"), 1.0)
+            yield named._replace(ignored=label.ignored or role == "ignored")
 
 
 def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledImages:

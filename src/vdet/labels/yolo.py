@@ -10,13 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
+from vdet.boxes import Box
 from vdet.config.document import parse_document
 from vdet.errors import ConfigError, ImageError, TruthError
 from vdet.files import is_hidden
 from vdet.labels.images import LabelledImage
-from vdet.labels.label import Label, Size, line_error
+from vdet.labels.label import NO_ID, Label, Size, line_error
 from vdet.labels.parsing import numbered_lines, read_bytes
 from vdet.media.images import is_image_name, read_header
+from vdet.track.track import Track
 
 _DATA = "data.yaml"
 _COLUMNS = 5
@@ -64,7 +66,7 @@ def _labels(path: Path, names: Mapping[float, str], size: Size) -> Iterator[Labe
             middle, sides = points
             points = np.array([middle - sides / 2, middle + sides / 2])
         (x1, y1), (x2, y2) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-        yield Label(line, (x1, y1, x2, y2), name)
+        yield Label(Track(NO_ID, Box(x1, y1, x2, y2), 1.0, "detected", name), line)
 
 
 def read_yolo_images(images: Path, labels: Path) -> Iterator[LabelledImage]:

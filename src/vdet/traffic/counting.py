@@ -111,12 +111,12 @@ def count_files(
 
 def _without_people(path: Path, saved: SavedTracks, settings: Settings) -> SavedTracks:
     """Return the tracks of another tool without people, with a warning, as a run has none."""
-    names = {label.name for label in saved.labels}
+    names = {label.track.class_name for label in saved.labels}
     people = {name for name in names if name and standard_class(name) == "person"}
     if not people or "person" in settings.detector.vehicle_classes:
         return saved
     _log.warning("%s: people are not counted; to count them, use --class person", path)
-    labels = tuple(label for label in saved.labels if label.name not in people)
+    labels = tuple(label for label in saved.labels if label.track.class_name not in people)
     return replace(saved, labels=labels)
 
 

@@ -1,6 +1,6 @@
 """Which windows become patches, what they show of a vehicle, and what cannot be mined."""
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from vdet.learn.svm.mining import (
 )
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
+from vdet.track.track import Track
 
 WIDTH = 1000
 CAR = Box.sized(400, 300, 100, 70)
@@ -33,7 +34,7 @@ GENEROUS = MiningLimits(per_vehicle=1000, false_alarms=1000, parts=1000, probabi
 
 def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> list[Label]:
     return [
-        Label(0, astuple(box), ignored=number >= len(vehicles))
+        Label(Track(0, box, 1.0, "detected"), ignored=number >= len(vehicles))
         for number, box in enumerate((*vehicles, *ignored))
     ]
 

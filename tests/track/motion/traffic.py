@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from track.motion.scenes import HEIGHT, WIDTH
-from vdet.boxes import Boxes, Float64Array, coverage
+from vdet.boxes import Box, Boxes, Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import NO_ID, Label, SavedTracks
 from vdet.track.motion.tracker import MotionTracker
+from vdet.track.track import Track
 
 _FOCAL = 1150.0
 _HORIZON = 400.0
@@ -149,16 +150,12 @@ def track_scores(
     for number, vehicles in enumerate(clip, start=1):
         for vehicle in vehicles:
             id_ = vehicle.id if vehicle.counts else NO_ID
-            x1, y1, x2, y2 = vehicle.box.tolist()
-            corners, counts = (x1, y1, x2, y2), vehicle.counts
-            true.append(Label(0, corners, frame=number, id=id_, ignored=not counts))
+            track = Track(id_, Box.of(vehicle.box.tolist()), 1.0, "detected")
+            true.append(Label(track, frame=number, ignored=not vehicle.counts))
         if (number - 1) % stride:
             tracks = tracker.at(number / rate)
         else:
             tracks = tracker.update(detect(vehicles, noise, rng), number / rate)
-        for track in tracks:
-            box = track.box
-            corners = box.x1, box.y1, box.x2, box.y2
-            shown.append(Label(0, corners, frame=number, id=track.id, score=track.score))
+        shown += [Label(track, frame=number) for track in tracks]
     videos = [SavedTracks(tuple(rows)) for rows in (shown, true)]
     return score(*videos)

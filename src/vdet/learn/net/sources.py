@@ -2,7 +2,7 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -160,10 +160,10 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> NetSource:
     labels: dict[int, list[Label]] = defaultdict(list)
     for label in saved.labels:
         if label.frame in used:
-            name = roles.class_of(label.name or "car") or "vehicle"
-            labels[label.frame].append(label._replace(name=name))
+            name = roles.class_of(label.track.class_name or "car") or "vehicle"
+            labels[label.frame].append(label.named(name))
     ignored = Counter(
-        label.name or "" for some in labels.values() for label in some if label.ignored
+        label.track.class_name or "" for some in labels.values() for label in some if label.ignored
     )
     labelled = LabelledImages(video.name, (), ignored=dict(ignored.most_common()))
 
@@ -203,8 +203,10 @@ def _sample(image: Image, labelled: LabelledImage, classes: Sequence[str]) -> Ne
     height, width = image.shape[:2]
     number = {name: index for index, name in enumerate(classes)}
     unlabelled = [number[name] for name in labelled.unlabelled if name in number]
-    named = [number.get(label.name or "", UNLABELLED) for label in labelled.labels]
-    boxes = [*(label.box for label in labelled.labels), *[(0, 0, width, height)] * len(unlabelled)]
+    tracks = [label.track for label in labelled.labels]
+    named = [number.get(track.class_name or "", UNLABELLED) for track in tracks]
+    boxes = [astuple(track.box) for track in tracks]
+    boxes += [(0, 0, width, height)] * len(unlabelled)
     is_whole = np.repeat([False, True], [len(named), len(unlabelled)])
     sample = NetSample(
         image,
