@@ -10,7 +10,6 @@ temporary folder is the only copy of an older file.
 import contextlib
 import fcntl
 import json
-import math
 import os
 import platform
 import re
@@ -481,18 +480,10 @@ def json_line(values: Any, **options: Any) -> str:
     try:
         return json.dumps(values, allow_nan=False, **options) + "\n"
     except ValueError:
-        return json.dumps(_finite(values), **options) + "\n"
+        from pydantic_core import to_jsonable_python  # only plug-ins have such numbers
 
-
-def _finite(values: Any) -> Any:
-    match values:
-        case float():
-            return values if math.isfinite(values) else None
-        case Mapping():
-            return {key: _finite(value) for key, value in values.items()}
-        case list() | tuple():
-            return list(map(_finite, values))
-    return values
+        finite = to_jsonable_python(values, inf_nan_mode="null")
+        return json.dumps(finite, **options) + "\n"
 
 
 def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> bytes:

@@ -6,6 +6,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, unquote_plus
@@ -185,21 +186,14 @@ def image_names(path: Path, names: Sequence[str]) -> list[Path]:
     addresses = [name.rpartition("?d=")[2].partition("?")[0] for name in names]
     decoded = [list(map(decode, addresses)) for decode in (unquote, unquote_plus)]
     last_parts = [[re.split(r"[/\\]", name)[-1] for name in item] for item in (addresses, *decoded)]
-    found: list[list[Path]] = []
-    errors: list[TruthError] = []
-    for spelled in (list(names), *decoded, *last_parts):
-        if names and len(set(spelled)) == len(set(names)):
-            try:
+    for spelled in (names, *decoded, *last_parts) if names else ():
+        if len(set(spelled)) == len(set(names)):
+            with suppress(TruthError):
                 folder = image_folder(path, spelled)
-            except TruthError as error:
-                errors.append(error)
-            else:
-                found.append([folder / name for name in spelled])
-                if all(map(is_file, found[-1])):
-                    return found[-1]
-    if errors and not found:
-        raise errors[0]
-    return found[0] if found else []
+                paths = [folder / name for name in spelled]
+                if all(map(is_file, paths)):
+                    return paths
+    return [image_folder(path, names) / name for name in names]
 
 
 def image_folder(path: Path, names: Sequence[str]) -> Path:

@@ -171,8 +171,8 @@ def test_classes_that_are_not_used_are_named(
 @pytest.mark.parametrize(
     ("class_id", "words"),
     [
-        (0, "found only class 0, a person in COCO; set detector.class_names"),
-        (90, "found class 90, but COCO has 0 to 79; set detector.class_names"),
+        (0, "its highest class is 0; COCO has 0, a person, to 79; set detector.class_names"),
+        (90, "its highest class is 90; COCO has 0, a person, to 79; set detector.class_names"),
         (CAR, ""),
     ],
 )

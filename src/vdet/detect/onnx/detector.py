@@ -55,7 +55,6 @@ _MAX_HEIGHT = 1.8
 """Maximum height of a vehicle with four wheels, in widths; what is higher is a sign or a post."""
 
 _USUAL = NetworkSettings().classes
-_MAX_LISTED = 10  # names in a message
 
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
 
@@ -83,25 +82,22 @@ class NetworkModel:
         if missing := {*settings.classes} - {*detectable, *_USUAL}:
             log.warning("%s: lacks detector.classes %s", path, ", ".join(sorted(missing)))
         unused = [
-            printable(name)
+            name
             for name, number in zip(names, self._numbers.tolist(), strict=False)
             if number == -1 and standard_class(name) is None and name not in COCO
         ]
         if unused and "classes" not in settings.model_fields_set:
-            listed = ", ".join(unused[:_MAX_LISTED]) + (" …" if len(unused) > _MAX_LISTED else "")
+            listed = printable(", ".join(unused))
             log.warning("%s: not reported: %s; if vehicles, set detector.classes", path, listed)
         self._seen = set[int]()
 
     def warnings(self) -> list[str]:
         """Return what is odd about the classes that were found, in all videos and images."""
-        if self._recognized.is_named or not self._seen:
+        highest = max(self._seen, default=1)
+        if self._recognized.is_named or 0 < highest < len(COCO):
             return []
-        seen, last = "", len(self._recognized.names) - 1
-        if (largest := max(self._seen)) > last:
-            seen = f"found class {largest}, but COCO has 0 to {last}"
-        elif largest == 0:
-            seen = "found only class 0, a person in COCO"
-        return [f"the network has no names, and {seen}; set detector.class_names"] if seen else []
+        seen = f"its highest class is {highest}; COCO has 0, a person, to {len(COCO) - 1}"
+        return [f"the network has no names, and {seen}; set detector.class_names"]
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002
         """Return a detector for frames of one size."""
