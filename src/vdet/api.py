@@ -49,7 +49,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkKind, check_sinks
 from vdet.run.steps import Step
-from vdet.run.video import Results, Run, RunTotals, open_video, run_video
+from vdet.run.video import Results, Run, RunTotals, run_video
 from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.corrections import read_corrections
@@ -217,7 +217,7 @@ def follow(source: PathName | Run, **options: Unpack[RunOptions]) -> Results:
 
     Raises `VideoError` with the first frame if the video cannot be read or searched.
     """
-    return Results(open_video(*_prepare(source, options)))
+    return Results(*_prepare(source, options))
 
 
 def vehicles(source: PathName | Run, **options: Unpack[RunOptions]) -> tuple[VehicleRecord, ...]:

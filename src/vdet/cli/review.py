@@ -37,8 +37,7 @@ def review(
     Example:
       vdet review in.mp4 --tracks-from tracks.jsonl -c gate.yaml -o review
     """
-    from vdet.run.review import write_saved_review
-    from vdet.run.video import Run
+    from vdet.run.video import Run, run_video
 
     source.check_for_tracks()
     settings = source.load()
@@ -54,5 +53,5 @@ def review(
         settings_files=(*source.files, tracks),
     )
     with progress_bars(" frames") as progress:
-        write_saved_review(run, tracks, progress)
+        run_video(run, tracks=tracks, progress=progress, is_last=True)
     print_lines(f"{output}: written")

@@ -17,7 +17,7 @@ from vdet.labels.roles import Roles
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
 from vdet.run.loop import Parts
-from vdet.run.video import Run, open_video
+from vdet.run.video import Results, Run
 
 _log = logging.getLogger("vdet")
 
@@ -82,7 +82,7 @@ def evaluate_video(
     progress: Progress = no_progress,
     until: int | None = None,
 ) -> ClipResult:
-    """Find the vehicles in a video with `vdet.run.video.open_video`, and score them.
+    """Find the vehicles in a video with `vdet.run.video.Results`, and score them.
 
     True vehicles outside the regions are ignored.
 
@@ -108,9 +108,9 @@ def evaluate_video(
     run = Run(video, settings=all_classes, frames=until or truth.length or None)
     labels, frames = list[Label](), 0
     truth = truth.until(until) if until else truth
-    with open_video(run, Parts(model), with_traffic=False) as opened:
-        advance, info = progress("", opened.reader.expected), opened.reader.info
-        for result in opened.results:
+    with Results(run, Parts(model), with_traffic=False) as results:
+        advance, info = progress("", results.reader.expected), results.reader.info
+        for result in results:
             labels += [
                 Label(replace(track, box=track.box.rounded), frame=result.frame.index)
                 for track in result.tracks

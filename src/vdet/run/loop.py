@@ -2,7 +2,7 @@
 
 `build` makes the `Pipeline` of a video, and `Pipeline.follow` passes its frames through:
 
-1. `FrameSearch.search`, in threads: everything that needs no earlier frame;
+1. `search_frames`, in threads: everything that needs no earlier frame;
 2. `observe`, in the order of the frames: the detections go to the tracker;
 3. a delay of `look_ahead` seconds of video, so that the tracker knows later detections;
 4. `complete`: the tracks at the time of the frame, and then every step.
@@ -22,7 +22,7 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.media import Frame, VideoInfo
 from vdet.run.result import Facts, FrameResult
-from vdet.run.search import FrameSearch, SearchedFrame, SearchRate
+from vdet.run.search import SearchedFrame, SearchRate, search_frames
 from vdet.run.steps import FindingStep, Step, StepContext, make_steps
 from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, VideoTracker
@@ -71,8 +71,8 @@ class Pipeline:
         ValueError
             The times of the frames do not increase.
         """
-        search = FrameSearch(self.detector, self.steps, self.rate, threads)
-        with closing(search.search(frames)) as searched_frames:
+        search = search_frames(frames, self.detector, self.rate, steps=self.steps, threads=threads)
+        with closing(search) as searched_frames:
             observed = (self.observe(searched, source) for searched in searched_frames)
             for result in _delayed(observed, self.look_ahead):
                 yield self.complete(result)

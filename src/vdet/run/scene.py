@@ -1,38 +1,25 @@
 """The scene that a camera shows, and the tracks of its vehicles, for `vdet draw`."""
 
-import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.errors import TruthError, VideoError
-from vdet.findings import Finding, at_places, warnings_in, without
-from vdet.labels.label import Size
-from vdet.labels.reading import read_tracks
-from vdet.media import Frame, VideoInfo
+from vdet.errors import VideoError
+from vdet.findings import at_places, warnings_in
+from vdet.media import Frame
 from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress
-from vdet.regions import Regions
 from vdet.run.result import findings_in
-from vdet.run.video import Run, log, open_video
+from vdet.run.video import Results, Run, SceneTracks, log, saved_tracks
 from vdet.track.track import FrameTracks
 
 _MAX_SAMPLES = 20
 """Maximum number of frames for the image of the scene; at least half of them are used."""
 _STILL_FRAMES = 5000
 """Number of frames to read for it if the tracks are saved."""
-
-
-@dataclass(frozen=True, slots=True)
-class SceneTracks:
-    """The tracks of the vehicles in a scene, and reasons to doubt them where there are lines."""
-
-    frames: list[FrameTracks]
-    findings: tuple[Finding, ...] = ()
 
 
 def read_scene(run: Run, tracks: Path | None, progress: Progress) -> tuple[Image, SceneTracks]:
@@ -54,7 +41,7 @@ def read_scene(run: Run, tracks: Path | None, progress: Progress) -> tuple[Image
     if is_image_file(run.source):
         image = read_image(run.source)
         height, width = image.shape[:2]
-        shown = saved_frames(tracks, run, (width, height)) if tracks else SceneTracks([])
+        shown = saved_tracks(tracks, run, (width, height)) if tracks else SceneTracks([])
     else:
         images, shown = (
             _with_saved_tracks(run, tracks, progress) if tracks else _with_detection(run, progress)
@@ -75,7 +62,7 @@ def _with_saved_tracks(
         run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
     ) as reader:
         size = reader.info.width, reader.info.height
-        saved = saved_frames(tracks, run, size, reader.info)
+        saved = saved_tracks(tracks, run, size, reader.info)
         progress("reading the scene", None)
         return _spread(reader), saved
 
@@ -83,16 +70,16 @@ def _with_saved_tracks(
 def _with_detection(run: Run, progress: Progress) -> tuple[list[Image], SceneTracks]:
     """Return some of the images, and the tracks of all frames."""
     shown: list[FrameTracks] = []
-    with open_video(run, with_traffic=False) as video:
-        advance = progress("", video.reader.expected)
+    with Results(run, with_traffic=False) as results:
+        advance = progress("", results.reader.expected)
 
         def frames() -> Iterator[Frame]:
-            for result in video.results:
+            for result in results:
                 shown.append(result.frame_tracks)
                 yield result.frame
                 advance(1)
 
-        images, findings = _spread(frames()), findings_in(video.facts)
+        images, findings = _spread(frames()), findings_in(results.facts)
         return images, SceneTracks(shown, at_places((*findings.items, *findings.facts)))
 
 
@@ -105,26 +92,3 @@ def _spread(frames: Iterable[Frame]) -> list[Image]:
         if len(images) > _MAX_SAMPLES:
             images, step = images[::2], 2 * step
     return images
-
-
-def saved_frames(tracks: Path, run: Run, size: Size, video: VideoInfo | None = None) -> SceneTracks:
-    """Return the frames of a file of tracks in the part of a run, with the vehicles in its regions.
-
-    `size` is that of the frames, pixels. Without a video, the first frame of the file is the first
-    one of the video. Raises `TruthError`, also if the tracks are of frames of another size.
-    """
-    saved = read_tracks(tracks, float(video.rate) if video else None, size)
-    if video and saved.video and saved.video.name != video.name:
-        log.warning("%s: is of %s, not %s", tracks, saved.video.name, video.name)
-    if not saved.has_times:
-        raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    origin = float(video.start) if video else saved.first_time
-    start = origin + float(run.start or 0)
-    end = math.inf if run.end is None else origin + float(run.end)
-    regions = Regions(run.settings.regions, *size)
-    frames = [
-        replace(frame, tracks=regions.inside(frame.tracks))
-        for frame in saved
-        if start <= frame.time < end
-    ]
-    return SceneTracks(frames, without(at_places(saved.findings), run.settings.conditions.ignore))

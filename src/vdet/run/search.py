@@ -8,7 +8,6 @@ if these differ.
 import math
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass
 from itertools import chain
 from statistics import fmean
@@ -162,8 +161,15 @@ def shows_same(before: Boxes, after: Boxes) -> bool:
     return len(a) == len(b) and bool(in_place.any(axis=0).all())
 
 
-class FrameSearch:
-    """Searches the frames of one video in threads.
+def search_frames(
+    frames: Iterable[Frame],
+    detector: VideoDetector,
+    rate: SearchRate,
+    *,
+    steps: Sequence[Step] = (),
+    threads: int = 1,
+) -> Generator[SearchedFrame]:
+    """Search the frames of one video in threads; yield them in their order.
 
     Parameters
     ----------
@@ -172,57 +178,45 @@ class FrameSearch:
     threads
         Number of frames searched at once. The results do not depend on it. At most this number of
         segments, and one more, are in memory.
+
+    Raises
+    ------
+    ValueError
+        The times of the frames do not increase.
     """
+    parallel = [step for step in steps if isinstance(step, ParallelStep)]
+    is_stateless = getattr(detector, "is_stateless", False)
+    may_skip = is_stateless and rate.searches and rate.stride is None
+    parts = segments(rate.choose(frames), MAX_KEY_INTERVAL if may_skip else 0)
+    finished: Iterable[SearchedFrame] = ()
+    before: Boxes | None = None  # what the last key frame shows
 
-    def __init__(
-        self, detector: VideoDetector, steps: Sequence[Step], rate: SearchRate, threads: int
-    ) -> None:
-        self._detector, self._rate, self._threads = detector, rate, threads
-        self._steps = [step for step in steps if isinstance(step, ParallelStep)]
-        self._is_stateless = getattr(detector, "is_stateless", False)
-        self._key_before: Boxes | None = None
-
-    def search(self, frames: Iterable[Frame]) -> Generator[SearchedFrame]:
-        """Yield the frames in their order, after their search.
-
-        Raises `ValueError` if their times do not increase.
-        """
-        may_skip = self._is_stateless and self._rate.searches and self._rate.stride is None
-        parts = segments(self._rate.choose(frames), MAX_KEY_INTERVAL if may_skip else 0)
-        finished: Iterable[SearchedFrame] = ()
-        with SearchThreads(self._threads) as pool:
-            ahead = max(1, self._threads - 1)  # and the one whose second phase has begun
-            for segment, last in pool.map_ordered(self._search_last, parts, ahead):
-                between = self._search_between(pool, segment, last)
-                # Threads stay busy while the caller uses the frames of the segment before.
-                yield from finished
-                finished = chain((future.result() for future in between), [last])
-            yield from finished
-
-    def _search_between(
-        self, pool: SearchThreads, segment: Segment, last: SearchedFrame
-    ) -> list[Future[SearchedFrame]]:
-        """Begin the second phase of a segment, of which the `last` frame has been searched."""
-        key, before = last.detections if segment.has_key else None, self._key_before
-        is_still = before is not None and key is not None and shows_same(before, key)
-        self._key_before = key
-        return [
-            pool.submit(self._search, frame, is_chosen and not is_still)
-            for frame, is_chosen in segment.frames[:-1]
-        ]
-
-    def _search_last(self, segment: Segment) -> SearchedFrame:
-        """Do the first phase: prepare all frames, and search the last one if it is chosen."""
-        for step in self._steps:
-            for frame, _ in segment.frames:
-                step.prepare(frame)
-        frame, is_chosen = segment.frames[-1]
-        return self._search(frame, is_chosen)
-
-    def _search(self, frame: Frame, is_due: bool) -> SearchedFrame:
+    def search(frame: Frame, is_due: bool) -> SearchedFrame:
         if not is_due:
             return SearchedFrame(frame)
-        candidates = self._detector.search(frame.picture, frame.index)
-        if self._is_stateless:
-            return SearchedFrame(frame, True, detections=self._detector.detect(candidates))
+        candidates = detector.search(frame.picture, frame.index)
+        if is_stateless:
+            return SearchedFrame(frame, True, detections=detector.detect(candidates))
         return SearchedFrame(frame, True, candidates)
+
+    def search_last(segment: Segment) -> SearchedFrame:
+        """Do the first phase: prepare all frames, and search the last one if it is chosen."""
+        for step in parallel:
+            for frame, _ in segment.frames:
+                step.prepare(frame)
+        return search(*segment.frames[-1])
+
+    with SearchThreads(threads) as pool:
+        ahead = max(1, threads - 1)  # and the one whose second phase has begun
+        for segment, last in pool.map_ordered(search_last, parts, ahead):
+            key = last.detections if segment.has_key else None
+            is_still = before is not None and key is not None and shows_same(before, key)
+            before = key
+            between = [
+                pool.submit(search, frame, is_chosen and not is_still)
+                for frame, is_chosen in segment.frames[:-1]
+            ]
+            # Threads stay busy while the caller uses the frames of the segment before.
+            yield from finished
+            finished = chain((future.result() for future in between), [last])
+        yield from finished

@@ -1,29 +1,33 @@
 """A run: read a video, search its frames, track the vehicles, and pass the results to sinks."""
 
 import logging
+import math
 import time
 from collections.abc import Generator, Iterator, Mapping
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model, load_detector
-from vdet.detect.protocol import VideoDetector, stage_images_of, warnings_of
-from vdet.errors import ConfigError, FrameSizeError, VideoError
+from vdet.detect.protocol import StageImages, stage_images_of, warnings_of
+from vdet.errors import ConfigError, FrameSizeError, TruthError, VideoError
 from vdet.files import FileIds, OutputFiles, valid_text
-from vdet.findings import Finding
+from vdet.findings import Finding, Findings, at_places, without
+from vdet.media import Frame, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
+from vdet.regions import Regions
 from vdet.run.inputs import input_files
 from vdet.run.loop import Parts, build, named_errors, peek
 from vdet.run.result import FINDINGS, Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.threads import read_async
+from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.counts import Corrected, Counts
 from vdet.traffic.live import LiveTraffic
@@ -121,73 +125,168 @@ class RunTotals:
 
 
 @dataclass(frozen=True, slots=True)
-class OpenVideo:
-    """A video that is being read.
+class SceneTracks:
+    """The tracks of the vehicles in a scene, and reasons to doubt them where there are lines."""
+
+    frames: list[FrameTracks]
+    findings: tuple[Finding, ...] = ()
+
+
+def saved_tracks(
+    tracks: Path, run: Run, size: tuple[int, int], video: VideoInfo | None = None
+) -> SceneTracks:
+    """Return the frames of a file of tracks in the part of a run, with the vehicles in its regions.
+
+    `size` is that of the frames, pixels. Without a video, the first frame of the file is the first
+    one of the video. Raises `TruthError`, also if the tracks are of frames of another size.
+    """
+    from vdet.labels.reading import read_tracks  # most runs read none
+
+    saved = read_tracks(tracks, float(video.rate) if video else None, size)
+    if video and saved.video and saved.video.name != video.name:
+        log.warning("%s: is of %s, not %s", tracks, saved.video.name, video.name)
+    if not saved.has_times:
+        raise TruthError(f"{tracks}: has no times; CLIP must be the video")
+    origin = float(video.start) if video else saved.first_time
+    start = origin + float(run.start or 0)
+    end = math.inf if run.end is None else origin + float(run.end)
+    regions = Regions(run.settings.regions, *size)
+    frames = [
+        replace(frame, tracks=regions.inside(frame.tracks))
+        for frame in saved
+        if start <= frame.time < end
+    ]
+    return SceneTracks(frames, without(at_places(saved.findings), run.settings.conditions.ignore))
+
+
+class Results(Iterator[FrameResult]):
+    """The results of a video, frame by frame, and their totals; a context manager.
+
+    The video is opened when the block begins, or with the first result. Reading and searching run
+    in threads. Errors as for `run_video`.
+
+    Parameters
+    ----------
+    parts, tracks
+        As for `run_video`.
+    with_traffic
+        Whether vehicles are counted and recorded.
 
     Attributes
     ----------
-    results
-        The results of its frames, in order.
-    traffic
-        Counts, speeds and records of the results so far, if `open_video` was called with them.
+    reader, traffic, stage_images
+        The open video, its counts, speeds and records so far, and what draws stages.
     facts
         Results of steps about the whole video, by name; empty before the last frame.
     """
 
     reader: VideoReader
-    detector: VideoDetector
-    results: Generator[FrameResult]
-    traffic: LiveTraffic
-    facts: dict[str, Fact]
+    traffic: LiveTraffic | None = None
+    stage_images: StageImages = staticmethod(lambda *_: {})
 
+    def __init__(
+        self,
+        run: Run,
+        parts: Parts | None = None,
+        *,
+        tracks: Path | None = None,
+        with_traffic: bool = True,
+    ) -> None:
+        self._run, self._with_traffic = run, with_traffic
+        self.facts: dict[str, Fact] = {}
+        self._results = self._read(parts, tracks)
 
-@contextmanager
-def open_video(
-    run: Run, parts: Parts | None = None, *, with_traffic: bool = True
-) -> Iterator[OpenVideo]:
-    """Open a video, and track the vehicles in it; parameters and errors as for `run_video`.
+    def __enter__(self) -> Self:
+        next(self._results)
+        return self
 
-    Reading and searching run in threads. Without `with_traffic`, nothing is counted or recorded.
-    """
-    parts = parts or Parts(load_detector(run.settings.detector))
-    corrections = None
-    if run.corrections:  # most runs have none, and load nothing for them
-        from vdet.traffic.corrections import by_video, read_corrections
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
-        name, reviews = valid_text(run.source.name), read_corrections(run.corrections)
-        corrections = by_video(reviews, {name: name}, run.settings.traffic)[name]
-    with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, read):
-        images, frames = peek(read)
-        settings, info = run.settings, reader.info
+    def __next__(self) -> FrameResult:
+        result = next(self._results)
+        return next(self) if result is None else result
+
+    def close(self) -> None:
+        """Close the video before its last frame."""
+        self._results.close()
+
+    @property
+    def counts(self) -> Counts | None:
+        """The counts so far at the lines and in the zones of the settings; None without any."""
+        return self.traffic.counts() if self.traffic else None
+
+    @property
+    def vehicles(self) -> tuple[VehicleRecord, ...]:
+        """A record of each vehicle, by id; empty before the last frame."""
+        return self.traffic.vehicles if self.traffic else ()
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Reasons to doubt the results; empty before the last frame."""
+        return findings_in(self.facts).items
+
+    def _read(self, parts: Parts | None, tracks: Path | None) -> Generator[FrameResult | None]:
+        """Yield None when the video is open, and then the results."""
+        run, settings, clock, corrections = self._run, self._run.settings, None, None
+        model = parts or (None if tracks else Parts(load_detector(settings.detector)))
+        if run.corrections:  # most runs have none, and load nothing for them
+            from vdet.traffic.corrections import by_video, read_corrections
+
+            name, reviews = valid_text(run.source.name), read_corrections(run.corrections)
+            corrections = by_video(reviews, {name: name}, settings.traffic)[name]
+        with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, frames):
+            self.reader, info = reader, reader.info
+            if model:
+                results = self._searched(model, frames)
+                start, length = float(info.start), info.duration
+                clock = find_clock(run.source, settings, start, tags=info.tags, length=length)
+            elif tracks:
+                results = self._saved(tracks, frames)
+            width, height = info.width, info.height
+            traffic = LiveTraffic(settings, width, height, clock, corrections=corrections)
+            self.traffic = traffic
+            yield None
+            with closing(results):
+                for result in results:
+                    if self._with_traffic:
+                        traffic.add(result.frame_tracks)
+                    yield result.of_classes(settings.classes)
+            if self._with_traffic:
+                traffic.end(findings_in(self.facts))
+                if counts := traffic.counts():
+                    findings = replace(findings_in(self.facts), items=counts.findings)
+                    self.facts[FINDINGS] = findings
+
+    def _searched(self, parts: Parts, frames: Iterator[Frame]) -> Generator[FrameResult]:
+        """Return the results of a search, which end with the facts."""
+        run, info = self._run, self.reader.info
+        images, every_frame = peek(frames)
         try:
-            pipeline = build(parts, settings, info, images)
+            pipeline = build(parts, run.settings, info, images)
         except FrameSizeError as error:
             log.warning("%s: no vehicles can be detected: %s", run.source, error)
-            pipeline = build(Parts(as_model(lambda _: NO_BOXES)), settings, info, images)
-        del images  # otherwise they stay in memory for the whole run
-        clock = find_clock(
-            run.source, settings, float(info.start), tags=info.tags, length=info.duration
-        )
-        traffic = LiveTraffic(settings, info.width, info.height, clock, corrections=corrections)
-        facts: dict[str, Fact] = {}
+            pipeline = build(Parts(as_model(lambda _: NO_BOXES)), run.settings, info, images)
+        self.stage_images = stage_images_of(pipeline.detector)
 
         def results() -> Generator[FrameResult]:
             threads = run.threads or core_count()
-            with closing(pipeline.follow(frames, run.source, threads=threads)) as completed:
-                for result in completed:
-                    if with_traffic:
-                        traffic.add(result.frame_tracks)
-                    yield result.of_classes(settings.classes)
-            facts.update(pipeline.facts())
+            yield from pipeline.follow(every_frame, run.source, threads=threads)
+            self.facts.update(pipeline.facts())
             for warning in warnings_of(parts.model):
                 log.warning("%s: %s", run.source, warning)
-            if with_traffic:
-                traffic.end(findings_in(facts))
-                if counts := traffic.counts():
-                    facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
 
-        with closing(results()) as every_result:
-            yield OpenVideo(reader, pipeline.detector, every_result, traffic, facts)
+        return results()
+
+    def _saved(self, tracks: Path, frames: Iterator[Frame]) -> Generator[FrameResult]:
+        """Yield the results of saved tracks, and add the facts."""
+        source, info = self._run.source, self.reader.info
+        saved = saved_tracks(tracks, self._run, (info.width, info.height), info)
+        shown = {frame.index: frame.tracks for frame in saved.frames}
+        for frame in frames:
+            of_frame = shown.get(frame.index, ())
+            yield FrameResult(source, frame, NO_BOXES, of_frame, searched=False)
+        self.facts[FINDINGS] = Findings(saved.findings)
 
 
 @contextmanager
@@ -199,47 +298,13 @@ def _opened(run: Run) -> Iterator[VideoReader]:
         yield reader
 
 
-class Results(Iterator[FrameResult]):
-    """The results of a video, frame by frame, and their totals.
-
-    `video` is the value of `open_video`. It is opened when the first result is requested; errors as
-    for `open_video`.
-    """
-
-    _video: OpenVideo | None = None
-
-    def __init__(self, video: AbstractContextManager[OpenVideo]) -> None:
-        self._results = self._read(video)
-
-    def _read(self, video: AbstractContextManager[OpenVideo]) -> Generator[FrameResult]:
-        with video as self._video:
-            yield from self._video.results
-
-    def __next__(self) -> FrameResult:
-        return next(self._results)
-
-    def close(self) -> None:
-        """Close the video before its last frame."""
-        self._results.close()
-
-    @property
-    def counts(self) -> Counts | None:
-        """The counts so far at the lines and in the zones of the settings; None without any."""
-        return self._video.traffic.counts() if self._video else None
-
-    @property
-    def vehicles(self) -> tuple[VehicleRecord, ...]:
-        """A record of each vehicle, by id; empty before the last frame."""
-        return self._video.traffic.vehicles if self._video else ()
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Reasons to doubt the results; empty before the last frame."""
-        return findings_in(self._video.facts).items if self._video else ()
-
-
 def run_video(
-    run: Run, parts: Parts | None = None, *, progress: Progress = no_progress, is_last: bool = False
+    run: Run,
+    parts: Parts | None = None,
+    *,
+    tracks: Path | None = None,
+    progress: Progress = no_progress,
+    is_last: bool = False,
 ) -> RunTotals:
     """Process a run. Its outputs appear together, at the end of the run.
 
@@ -249,6 +314,8 @@ def run_video(
     ----------
     parts
         The detector, the tracker and further steps; None: as the settings say.
+    tracks
+        File of the tracks of its vehicles, which are not searched then.
     progress
         Called once, with the expected number of frames, for the progress.
     is_last
@@ -267,11 +334,16 @@ def run_video(
     files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs, is_last=is_last)
     check_sinks(run.outputs, files)
     with files:
-        return write_outputs(run, files, parts, progress=progress)
+        return write_outputs(run, files, parts, tracks=tracks, progress=progress)
 
 
 def write_outputs(
-    run: Run, files: OutputFiles, parts: Parts | None, *, progress: Progress = no_progress
+    run: Run,
+    files: OutputFiles,
+    parts: Parts | None,
+    *,
+    tracks: Path | None = None,
+    progress: Progress = no_progress,
 ) -> RunTotals:
     """Do as `run_video`, but leave the complete outputs in `files`, under temporary names.
 
@@ -280,8 +352,12 @@ def write_outputs(
     start_time = time.perf_counter()
     kinds = [sink_kind(output.sink) for output in run.outputs]
     with_traffic = bool(run.settings.traffic) or any(kind.uses_traffic for kind in kinds)
-    with open_video(run, parts, with_traffic=with_traffic) as video:
-        info, frames, ids = video.reader.info, 0, set[int]()
+    with (
+        named_errors(run.source, VideoError),
+        Results(run, parts, tracks=tracks, with_traffic=with_traffic) as results,
+    ):
+        info, traffic, frames, ids = results.reader.info, results.traffic, 0, set[int]()
+        assert traffic  # the video is open
         context = SinkContext(
             files,
             run.settings,
@@ -291,21 +367,21 @@ def write_outputs(
             end=run.end,
             at=run.at,
             outputs=run.outputs,
-            traffic=video.traffic,
-            facts=video.facts,
-            stage_images=stage_images_of(video.detector),
+            traffic=traffic,
+            facts=results.facts,
+            stage_images=results.stage_images,
         )
         with open_sinks(run.outputs, context) as sinks:
-            advance = progress("", video.reader.expected)
-            for result in video.results:
+            advance = progress("", results.reader.expected)
+            for result in results:
                 sinks.write(result)
                 ids.update(track.id for track in result.tracks)
                 frames += 1
                 advance(1)
             if not frames:
-                raise _no_frame(run, video.reader)
-        counts = video.traffic.counts()
-        for warning in (line for fact in video.facts.values() for line in str(fact).splitlines()):
+                raise _no_frame(run, results.reader)
+        counts = traffic.counts()
+        for warning in (line for fact in results.facts.values() for line in str(fact).splitlines()):
             log.warning("%s: %s", run.source, warning)
     return RunTotals(
         width=info.width,
@@ -313,9 +389,9 @@ def write_outputs(
         frames=frames,
         tracks=len(ids),
         seconds=time.perf_counter() - start_time,
-        clock=video.traffic.clock,
+        clock=traffic.clock,
         corrected=counts.corrected if counts else None,
-        facts=video.facts,
+        facts=results.facts,
         summaries=sinks.summaries,
     )
 
