@@ -84,7 +84,7 @@ class TestSearchesASecond:
 class RedNetwork:
     """Finds what is red, as one car."""
 
-    form = InputForm(WIDTH, HEIGHT)
+    form, is_named = InputForm(WIDTH, HEIGHT), True
 
     def find(self, picture: Picture, _: float) -> RawBoxes:
         y, x = np.nonzero(picture.image[..., 2] > 2 * picture.image[..., 0].astype(int))
