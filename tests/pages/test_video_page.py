@@ -235,6 +235,17 @@ class TestFindings:
         assert "Findings" in made.text
         assert "Findings" not in seen(page()).text
 
+    def test_a_moving_camera_has_no_paths(self) -> None:
+        moves = replace(self.FINDING, code="camera-moves")
+        assert ["Paths" in seen(replace(page(), findings=f)).text for f in ((), (moves,))] == [
+            True,
+            False,
+        ]
+
+    def test_vehicles_of_unknown_class_have_no_card_of_their_own(self) -> None:
+        unknown = replace(page(), records=[replace(TWO[0], class_name="vehicle"), TWO[1]])
+        assert [n for n, _ in unknown._figures()][:3] == ["vehicles", "truck", "maximum at once"]
+
     def test_vehicles_that_stood_are_counted_apart(self) -> None:
         stood = [replace(record, motion="standing") for record in TWO]
         made = replace(page(), records=[replace(TWO[0], motion="drove"), *stood[1:]])

@@ -101,10 +101,11 @@ def count(
     counted_classes = {event.class_name for result in videos.values() for event in result.events}
     for name in {*standard_classes(classes)} - {*counted_classes, *STANDARD_CLASSES}:
         LOG.warning("--class %s: no vehicle of this class was counted", name)
+    survey = Survey(videos, settings)
     with files:
         for output in outputs:
             with output_errors(output.path):
-                _write(output, files, Survey(videos, settings), scene)
+                _write(output, files, survey, scene)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
     for name, result in videos.items():
         if result.corrected:

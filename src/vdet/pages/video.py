@@ -215,7 +215,8 @@ class VideoPage:
         shown = sum(record.seconds for record in self.records) / max(1, len(self.records))
         stood = Counter(record.motion for record in self.records if not record.has_moved)
         driven = self._moved
-        classes = Counter(record.class_name for record in driven if record.class_name)
+        names = (record.class_name for record in driven)
+        classes = Counter(name for name in names if name and name != UNKNOWN)
         return [
             (plural(len(driven), "vehicle"), str(len(driven))),
             *((plural(n, name), str(n)) for name, n in classes.most_common(4)),
@@ -253,8 +254,8 @@ class VideoPage:
         return scene_picture(self.poster, traffic, self.survey.counts, paths)
 
     def _paths(self) -> Image | None:
-        """Return the poster with the paths of all vehicles."""
-        if self.poster is None:
+        """Return the poster with the paths of all vehicles; None if the camera moves."""
+        if self.poster is None or any(item.code == "camera-moves" for item in self.findings):
             return None
         height, width = self.poster.shape[:2]
         return with_marks(self.poster, path_marks(self.records, (width, height)))
