@@ -27,9 +27,9 @@ class CountScore:
     passed, counted
         Number of vehicles that passed, and that were counted.
     missed, false
-        Those that passed and were not counted, and the reverse.
+        Number of vehicles that passed and were not counted, and of counts without a vehicle.
     misnamed
-        Those that passed, and were counted as another class.
+        Number of vehicles that passed and were counted as another class.
     """
 
     name: str

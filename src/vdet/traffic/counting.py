@@ -191,7 +191,7 @@ class _Video:
     next_shift: int = 0
 
     def counts(self, group: Counts) -> Counts:
-        """Return those of its group that are of this video, at its times and frames."""
+        """Return the counts of this video from those of its group, at its own times and frames."""
         events = (
             replace(
                 event,

@@ -202,8 +202,8 @@ class SinkKind:
     total
         The file that a batch writes over all its videos.
     finish_order
-        Sinks with a lower number finish first: -1 finds facts and counts that others write, 1 links
-        the files of others.
+        Sinks with a lower number finish first: with -1, a sink that finds facts and counts for the
+        files of other sinks; with 1, a sink that links to these files.
     """
 
     open: Callable[[Path, SinkContext], Sink]

@@ -72,13 +72,14 @@ even if they are level. Half and twice: nothing.
 """
 
 CLEAR = 0.8
-"""A detection on a nearer vehicle is a part of it if its score is below this fraction of its score.
+"""A detection on a nearer vehicle is a part of that vehicle if it scores less than this fraction.
 Half: 5 % of two roads. Always: 3 to 15 % of each.
 """
 
 _DOUBTED = 0.5
-"""It is not a part of a vehicle that scores less than this fraction of its score: that one's box
-may span two vehicles that were seen as one. Half: nothing. Twice: 3 % of one road.
+"""A detection is not a part of a vehicle that scores less than this fraction of the detection: the
+box of that vehicle may span two vehicles that were seen as one. Half: nothing. Twice: 3 % of one
+road.
 """
 
 
