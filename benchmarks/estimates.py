@@ -127,7 +127,7 @@ def main() -> None:
             true = np.mean([result.true for result in results])
             half = np.mean([result.half for result in results]) / true
             error = np.mean([abs(result.estimate.true - result.true) for result in results]) / true
-            more = np.mean([result.estimate.more for result in results])
+            more = np.mean([result.estimate.minutes_to_precision for result in results])
             held = np.mean([result.holds for result in results])
             print(
                 f"| {name}: {group} | {situation.checked} of {situation.minutes} | {true:.0f} | "

@@ -49,7 +49,7 @@ from vdet.track.track import FrameTracks, Track
 from vdet.traffic.corrections import Corrections
 from vdet.traffic.counts import Counts
 from vdet.traffic.live import LiveTraffic
-from vdet.traffic.strips import Passage, Passages, bands_of
+from vdet.traffic.strips import BandPassage, Passages, bands_of
 
 SECONDS, VEHICLES, RATE = 3600, 600, Fraction(25, 2)
 EACH = VEHICLES // 20  # missed, false, and of a wrong class
@@ -242,7 +242,7 @@ class Survey:
 
     counts: Counts
     true: Counts
-    passages: Sequence[Passage]
+    passages: Sequence[BandPassage]
 
     def errors(self, road: Hour) -> list[Error]:
         """Return the errors in the order of time."""

@@ -21,7 +21,7 @@ from vdet.synthetic.render import frames
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Trace
 from vdet.traffic.crossings import lines_and_zones
-from vdet.traffic.strips import Band, Passage, Passages, bands_of, sampling_of
+from vdet.traffic.strips import Band, BandPassage, Passages, bands_of, sampling_of
 from vdet.traffic.traces import TraceSearch
 
 MISSED = 0.1
@@ -35,7 +35,7 @@ class Line:
     """A line of a scene: its passages, and the pixels of its band in each frame."""
 
     band: Band
-    passages: Sequence[Passage]
+    passages: Sequence[BandPassage]
     strip: Sequence[Image]
 
 
@@ -102,7 +102,7 @@ def measured(line: Line, truth: Sequence[FrameTracks], missed: set[int]) -> Outc
     return Outcome(len(line.passages), len(gone), found, len(traces) - found)
 
 
-def _shows(trace: Trace, passage: Passage) -> bool:
+def _shows(trace: Trace, passage: BandPassage) -> bool:
     is_near = abs(trace.time - passage.time) <= SECONDS
     return is_near and abs(trace.position - passage.position) <= PLACE
 

@@ -5,6 +5,7 @@ import graphlib
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -160,6 +161,12 @@ def test_finding_vehicles_imports_few_modules(clip_path: Path, tmp_path: Path) -
     """A module costs about half a millisecond at every start."""
     start = f"main(['detect-video', '-q', {str(clip_path)!r}, {str(tmp_path / 'out.mp4')!r}])"
     assert 400 < len(modules_of(start)) < 600
+
+
+def test_no_two_classes_share_a_name() -> None:
+    classes = re.compile(r"^ *class _*(\w+)", re.MULTILINE)
+    names = Counter(name for path in MODULES for name in classes.findall(path.read_text("utf-8")))
+    assert [name for name, number in names.items() if number > 1] == []
 
 
 def test_what_is_printed_goes_through_one_function() -> None:

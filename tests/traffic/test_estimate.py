@@ -44,9 +44,9 @@ def test_errors_are_added_and_removed_where_all_minutes_are_checked() -> None:
     errors = [MISSED, MISSED, FALSE, CountError(minute=3, counted="car", true="bus")]
     estimates = estimate(CARS, errors, checked=range(60), drawn=[])
     assert estimates == [
-        Estimate(group=None, counted=600, true=601, low=601, high=601, more=0),
-        Estimate(group="bus", counted=0, true=1, low=1, high=1, more=0),
-        Estimate(group="car", counted=600, true=600, low=600, high=600, more=0),
+        Estimate(group=None, counted=600, true=601, low=601, high=601, minutes_to_precision=0),
+        Estimate(group="bus", counted=0, true=1, low=1, high=1, minutes_to_precision=0),
+        Estimate(group="car", counted=600, true=600, low=600, high=600, minutes_to_precision=0),
     ]
 
 
@@ -77,7 +77,7 @@ def test_more_minutes_bring_the_interval_to_two_percent() -> None:
     errors = [CountError(minute, None, "car") for minute in range(0, 240, 2)]
     few = [error for error in errors if error.minute < 10]
     [whole, _] = estimate(counted, few, checked=order[:10], drawn=order)
-    enough = 10 + whole.more
+    enough = 10 + whole.minutes_to_precision
     assert 20 < enough < 120
     many = [error for error in errors if error.minute < enough]
     [whole, _] = estimate(counted, many, checked=order[:enough], drawn=order)
@@ -135,5 +135,6 @@ def test_the_page_shows_the_same_numbers(tmp_path: Path) -> None:
     for of_page, in_python in zip(json.loads(shown), expected, strict=True):
         assert [item["group"] for item in of_page] == [item.group for item in in_python]
         for item, exact in zip(of_page, in_python, strict=True):
-            for name in ("counted", "true", "low", "high", "more"):
+            item["minutes_to_precision"] = item["minutesToPrecision"]
+            for name in ("counted", "true", "low", "high", "minutes_to_precision"):
                 assert isclose(item[name], getattr(exact, name), rel_tol=1e-9), (item, exact)

@@ -58,7 +58,7 @@ def counts(begin: datetime, seconds: float, *events: Event, **values: Any) -> Co
 
 def morning() -> dict[str, Counts]:
     """An hour and ten minutes in two files: three vehicles cross the junction, one gets lost."""
-    bus = Estimate(group="bus", counted=0, true=1.2, low=0.9, high=2.7, more=9)
+    bus = Estimate(group="bus", counted=0, true=1.2, low=0.9, high=2.7, minutes_to_precision=9)
     hour = counts(
         BEGIN,
         3599.96,

@@ -29,7 +29,7 @@ from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.files import valid_text
 from vdet.labels.formats import Format, ImageTracks, last_classes
-from vdet.labels.images import LabelledImage, image_names, inside
+from vdet.labels.images import LabelledImage, image_names, inside_set
 from vdet.labels.label import NO_ID, Label, SavedTracks, Size, SourceVideo, line_error
 from vdet.labels.parsing import (
     LIMIT,
@@ -170,7 +170,7 @@ class _Image:
     id: int
     width: Index | None = None
     height: Index | None = None
-    file_name: Annotated[str, AfterValidator(inside)] = ""
+    file_name: Annotated[str, AfterValidator(inside_set)] = ""
     frame_index: Index | None = None
     time: float | str | None = None  # "night" in some sets of images
 
@@ -194,7 +194,7 @@ class _Info:
 
 
 @_entry
-class _Video:
+class _CocoVideo:
     vdet: SourceVideo | None = None
     """A key of our own."""
 
@@ -204,18 +204,18 @@ _Entries = Annotated[list[_Entry], FailFast()]
 
 
 @_entry
-class _Document:
+class _CocoDocument:
     images: _Entries[_Image]
     categories: _Entries[_Category] = Field(default_factory=list)
     annotations: _Entries[_Annotation] = Field(default_factory=list)
-    videos: list[_Video] = Field(default_factory=list)
+    videos: list[_CocoVideo] = Field(default_factory=list)
     info: _Info | None = None
 
 
-_DOCUMENT = TypeAdapter(_Document)
+_DOCUMENT = TypeAdapter(_CocoDocument)
 
 
-def _read(path: Path, data: bytes) -> _Document:
+def _read(path: Path, data: bytes) -> _CocoDocument:
     """Return the document. Raises `TruthError`."""
     try:
         document = _DOCUMENT.validate_json(data.removeprefix(BOM_UTF8))
@@ -227,7 +227,7 @@ def _read(path: Path, data: bytes) -> _Document:
     return document
 
 
-def _labels(path: Path, document: _Document, frames: Mapping[int, int]) -> Iterator[Label]:
+def _labels(path: Path, document: _CocoDocument, frames: Mapping[int, int]) -> Iterator[Label]:
     """Yield the label of each annotation; `frames` are those of images by their ids.
 
     Raises `TruthError` if an image or a category is missing.
@@ -279,7 +279,7 @@ def _read_head(path: Path, data: bytes) -> SavedTracks:
     return read_coco(path, data.rstrip() + b'], "images": []}')
 
 
-COCO = Format("COCO", ".coco.json", read_coco, whole=_write, read_head=_read_head)
+COCO = Format("COCO", ".coco.json", read_coco, write_video=_write, read_head=_read_head)
 
 
 def read_coco_images(path: Path) -> Iterator[LabelledImage]:

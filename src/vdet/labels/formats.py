@@ -46,10 +46,10 @@ class Format:
     read
         Function that takes the path of a file, for messages, and its content. It raises
         `TruthError` with the position of the first mistake; its labels are not checked elsewhere.
-    lines, heading
+    frame_lines, heading
         For a format with lines for each frame: function that returns the lines, with line ends, and
         the first line of the file.
-    whole
+    write_video
         For a format that is written at the end: function that writes all frames of a video.
     read_head
         Function like `read` for the first lines of a file; None if they have no times.
@@ -58,9 +58,9 @@ class Format:
     name: str
     suffix: str
     read: Callable[[Path, bytes], SavedTracks]
-    lines: Callable[[FrameTracks], Iterable[str]] | None = None
+    frame_lines: Callable[[FrameTracks], Iterable[str]] | None = None
     heading: str = ""
-    whole: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
+    write_video: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
     read_head: Callable[[Path, bytes], SavedTracks] | None = None
 
 
@@ -81,7 +81,7 @@ class TrackWriter:
 
     def write(self, frame: FrameTracks) -> None:
         """Add a frame."""
-        if not self._form.lines:
+        if not self._form.frame_lines:
             self._kept.append(replace(frame, facts={}))
             return
         if self._last:
@@ -93,16 +93,16 @@ class TrackWriter:
 
     def end(self, findings: tuple[Finding, ...] = ()) -> None:
         """Write everything that is left, with the findings. Not called after an error."""
-        if self._form.whole:
-            self._form.whole(self._file, replace(self._video, findings=findings), self._kept)
+        if self._form.write_video:
+            self._form.write_video(self._file, replace(self._video, findings=findings), self._kept)
         elif self._last:
             said = {FINDINGS: [finding.record() for finding in findings]} if findings else {}
             facts = {**self._last.facts, LAST: True, **said}
             self._write_lines(replace(self._last, facts=facts))
 
     def _write_lines(self, frame: FrameTracks) -> None:
-        assert self._form.lines
-        self._file.writelines(line.encode() for line in self._form.lines(frame))
+        assert self._form.frame_lines
+        self._file.writelines(line.encode() for line in self._form.frame_lines(frame))
 
 
 def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:

@@ -168,7 +168,7 @@ def is_file(path: Path) -> bool:
     return os.path.isfile(path)  # noqa: PTH113  # the method of `Path` raises
 
 
-def inside(name: str) -> str:
+def inside_set(name: str) -> str:
     """Return an image name from a file. Raises `ValueError` if it points outside the set."""
     if ".." in PurePosixPath(name.replace("\\", "/")).parts:
         raise ValueError(f"{printable(name)} points outside the set")

@@ -52,7 +52,7 @@ _Whole = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Box:
+class _BoxFields:
     """A box of a record or of a row, pixels."""
 
     id: Index
@@ -83,7 +83,7 @@ class _Box:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Row(_Box):
+class _Row(_BoxFields):
     """A row of CSV; the time is in seconds."""
 
     frame: Index
@@ -97,7 +97,7 @@ class _Record:
 
     frame: Index
     time: float
-    tracks: Annotated[list[_Box], FailFast()]
+    tracks: Annotated[list[_BoxFields], FailFast()]
     clock: str | None = None
     video: SourceVideo | None = None  # of the first frame
     findings: tuple[Finding, ...] = ()  # of the last frame

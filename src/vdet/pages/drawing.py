@@ -17,7 +17,7 @@ from vdet.config.schema import Settings
 from vdet.findings import Finding
 from vdet.media.images import encode_image
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
-from vdet.pages.traffic import Mark, traffic_marks, with_marks
+from vdet.pages.traffic import DrawnMark, traffic_marks, with_marks
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
 from vdet.traffic.crossings import lines_and_zones
@@ -97,7 +97,7 @@ class Drawing:
         script = Markup("\n".join(scripts))
         return render("draw.html", data=data, name=name, script=script, findings=self._findings)
 
-    def _marks(self) -> list[Mark]:
+    def _marks(self) -> list[DrawnMark]:
         counts = count_frames(self._frames, self._settings, self._size)
         lines, zones = lines_and_zones(self._settings.traffic, *self._size)
         paths = {

@@ -58,7 +58,7 @@ def crop_name(track: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class EventMark:
     """A counted event: number of the band, seconds from the first frame, position from 0 to 1.
 
     What appears or vanishes inside a zone is in no band.
@@ -83,7 +83,7 @@ class Review:
     traffic: TrafficSettings
     bands: Sequence[Band]
     pictures: Sequence[StripPicture]
-    marks: Sequence[Mark]
+    marks: Sequence[EventMark]
     traces: Sequence[Trace]
     findings: Sequence[Finding] = ()
     written: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))

@@ -39,7 +39,7 @@ _SHADE = 0.18
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class DrawnMark:
     """A line through `points`, open, closed or an arrow; its label, if any, is at `at`, pixels."""
 
     points: Sequence[Point]
@@ -56,7 +56,7 @@ def traffic_marks(
     borders: Sequence[Border],
     videos: Sequence[Counts],
     paths: Mapping[int, Sequence[Point]],
-) -> list[Mark]:
+) -> list[DrawnMark]:
     """Return the marks to draw on frames of this width and height, pixels.
 
     `paths` are those of tracks by id, pixels.
@@ -72,7 +72,7 @@ def traffic_marks(
         typical = shown[len(shown) // 2] if shown else ()
         path = _inside(typical, size)
         if len(path) > 1:
-            arrow = Mark(
+            arrow = DrawnMark(
                 path,
                 color=boxes.color_of(number),
                 width=max(2, round(_WIDEST * size[0] * len(trips) / maximum)),
@@ -84,13 +84,13 @@ def traffic_marks(
     return marks
 
 
-def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Iterator[Mark]:
+def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Iterator[DrawnMark]:
     """Yield the path of each vehicle that moved, in the colour of its direction."""
     width = max(1, size[1] // 720)
     for record in records:
         path = _inside(record.path, size)
         if record.length_fraction >= _SHORTEST and len(path) > 1:
-            yield Mark(path, direction_color(path[0], path[-1]), width, is_arrow=True)
+            yield DrawnMark(path, direction_color(path[0], path[-1]), width, is_arrow=True)
 
 
 def _inside(path: Sequence[Point], size: tuple[int, int]) -> list[Point]:
@@ -104,7 +104,9 @@ def direction_color(start: Point, end: Point) -> Color:
     return boxes.of_hue(angle / (2 * math.pi), 0.8)
 
 
-def border_marks(border: Border, totals: Mapping[Direction, int], text: str = "") -> Iterator[Mark]:
+def border_marks(
+    border: Border, totals: Mapping[Direction, int], text: str = ""
+) -> Iterator[DrawnMark]:
     """Yield the marks of a zone with its name and a text, or of a line with its name and counts.
 
     The arrow to the left is at the start of a line, that to the right at its end: beside the
@@ -114,20 +116,20 @@ def border_marks(border: Border, totals: Mapping[Direction, int], text: str = ""
     width = boxes.line_width(np.empty((int(height), 0), np.uint8))
     if not isinstance(border, Line):
         top = min(border.corners, key=lambda corner: corner[1])
-        yield Mark(border.corners, boxes.ZONE, width, border.name + text, top, is_closed=True)
+        yield DrawnMark(border.corners, boxes.ZONE, width, border.name + text, top, is_closed=True)
         return
     (ax, ay), (bx, by) = border.start, border.end
     middle = (ax + bx) / 2, (ay + by) / 2
-    yield Mark((border.start, border.end), boxes.LINE, width, border.name, middle)
+    yield DrawnMark((border.start, border.end), boxes.LINE, width, border.name, middle)
     left = (by - ay) / border.length, (ax - bx) / border.length
     ends, reaches = (border.start, border.end), (_SIDE * height, -_SIDE * height)
     for (x, y), reach, direction in zip(ends, reaches, border.directions, strict=True):
         tip = x + reach * left[0], y + reach * left[1]
         label = f"{direction} {totals.get((border.name, direction), 0)}"
-        yield Mark(((x, y), tip), boxes.LINE, width, label, tip, is_arrow=True)
+        yield DrawnMark(((x, y), tip), boxes.LINE, width, label, tip, is_arrow=True)
 
 
-def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
+def draw_marks(surface: Surface, marks: Iterable[DrawnMark]) -> None:
     """Draw marks, their labels above all lines."""
     drawn = list(marks)
     for mark in drawn:
@@ -145,7 +147,7 @@ def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
             boxes.draw_label(surface, mark.label, mark.at, mark.color)
 
 
-def with_marks(image: Image, marks: Iterable[Mark]) -> Image:
+def with_marks(image: Image, marks: Iterable[DrawnMark]) -> Image:
     """Return a copy of an image with marks on it."""
     drawn = image.copy()
     draw_marks(drawn, marks)

@@ -51,7 +51,7 @@ class Clock:
     first: float = 0.0
 
     def __str__(self) -> str:
-        return f"{_text(self.at(self.first))} ({self.source})"
+        return f"{_time_text(self.at(self.first))} ({self.source})"
 
     @property
     def is_doubtful(self) -> bool:
@@ -154,8 +154,8 @@ def _begin_by_name(
                 "%s: begins %s by its name, %s by its metadata; using the name; input.begin "
                 "overrides it",
                 path,
-                _text(_utc(named, zone).astimezone(zone)),
-                _text(_utc(written, zone).astimezone(zone)),
+                _time_text(_utc(named, zone).astimezone(zone)),
+                _time_text(_utc(written, zone).astimezone(zone)),
             )
     return named, "from its name"
 
@@ -165,7 +165,7 @@ def _utc(time: datetime, zone: tzinfo | None) -> datetime:
     return (time if time.tzinfo or not zone else time.replace(tzinfo=zone)).astimezone(UTC)
 
 
-def _text(time: datetime) -> str:
+def _time_text(time: datetime) -> str:
     return time.isoformat(" ", "seconds")
 
 

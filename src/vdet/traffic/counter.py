@@ -34,7 +34,7 @@ _LONG_STEP = 0.21
 
 
 @dataclass(frozen=True, slots=True)
-class _Passage:
+class _PathEvents:
     """The events of a vehicle, and by line or zone the heights of its box at these, pixels.
 
     `missed` are the lines at which its path begins or ends without crossing them.
@@ -86,7 +86,7 @@ class VehicleCounter:
         self.linker = TrackLinker(width, height, started)
         self._latest: FrameTracks | None = None
         self._steps = self._long_steps = 0
-        self._ended: list[_Passage] = []
+        self._ended: list[_PathEvents] = []
         self._ended_counts: Counter[Direction] = Counter()
         self._running_counts: Counter[Direction] = Counter()
         self._counted_at = -math.inf
@@ -153,13 +153,13 @@ class VehicleCounter:
             )
         return self._running_counts
 
-    def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
+    def _passages(self, paths: Iterable[VehiclePath]) -> list[_PathEvents]:
         """Return the passages that count: of the classes, seen long enough, and not parked."""
         minimum, classes = self._settings.traffic.min_seen_seconds, self._settings.classes
         seen = (path for path in paths if path.seconds >= minimum and path.has_moved)
         return [self._passage(path) for path in seen if is_chosen(path.class_name, classes)]
 
-    def _passage(self, path: VehiclePath) -> _Passage:
+    def _passage(self, path: VehiclePath) -> _PathEvents:
         events, heights = list[Event](), {}
         for border in self.borders:
             crossed = crossings(path, border)
@@ -170,7 +170,7 @@ class VehicleCounter:
         ends = [row for row in (0, path.seen - 1) if start < path.times[row] < now]
         uncrossed = [line for line in self.lines if not heights[line.name]]
         missed = lines_near(uncrossed, path.points[ends], _NEAR_LINE * path.heights[ends])
-        return _Passage(events, heights, [line.name for line in missed])
+        return _PathEvents(events, heights, [line.name for line in missed])
 
 
 def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
@@ -188,7 +188,7 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
     )
 
 
-def _line_findings(lines: Sequence[Line], passages: Sequence[_Passage]) -> Iterator[Finding]:
+def _line_findings(lines: Sequence[Line], passages: Sequence[_PathEvents]) -> Iterator[Finding]:
     """Yield each problem of a line that the tracks of a run show."""
     for line in lines if passages else ():
         crossed = [heights for passage in passages if (heights := passage.heights[line.name])]

@@ -135,7 +135,7 @@ def count_frames(
     frame_size = _frame_size(settings, size)
     group = _Group(_all_classes(settings, corrections), frame_size)
     reviews = by_video(corrections, {"": name}, settings.traffic)
-    group.add(_Video("", frame_size), frames)
+    group.add(_CountedVideo("", frame_size), frames)
     return apply_corrections(group.counts(), reviews, settings.classes)[""]
 
 
@@ -153,7 +153,7 @@ def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, 
 
 
 @dataclass(slots=True)
-class _Video:
+class _CountedVideo:
     """A video of a group; times are seconds of its own.
 
     Attributes
@@ -220,7 +220,9 @@ class _Recording:
         self._settings = settings
         self._counts: dict[str, Counts] = {}
         self._group: _Group | None = None
-        self._latest: tuple[_Video, SavedTracks] | None = None  # what ends last, with a clock
+        self._latest: tuple[_CountedVideo, SavedTracks] | None = (
+            None  # what ends last, with a clock
+        )
         self._is_chain = False  # whether each video begins at the end of the one before
 
     def in_order(self, paths: Sequence[Path]) -> list[tuple[Path, Clock | None]]:
@@ -260,7 +262,7 @@ class _Recording:
     ) -> None:
         """Count in the next video, whose frames have this size."""
         before = self._latest
-        video = _Video(str(path), size, clock, saved.first_time, saved.covered is not None)
+        video = _CountedVideo(str(path), size, clock, saved.first_time, saved.covered is not None)
         video.findings = at_places(saved.findings)
         if self._is_chain and before:
             video.clock = _clock_after(before[0], video)
@@ -288,7 +290,7 @@ class _Recording:
         return self._counts
 
 
-def _clock_after(before: _Video, video: _Video) -> Clock:
+def _clock_after(before: _CountedVideo, video: _CountedVideo) -> Clock:
     """Return the clock of a video that begins where the one before ends."""
     if not before.is_complete:
         fault = "the file before does not say how long its video is; use .jsonl tracks"
@@ -306,9 +308,9 @@ class _Group:
         self._ground = ground_of(settings.camera, *size)
         self._regions = Regions(settings.regions, *size) if settings.regions else None
         self.counter = VehicleCounter(settings, *size, started)
-        self._videos: list[_Video] = []
+        self._videos: list[_CountedVideo] = []
 
-    def add(self, video: _Video, frames: Iterable[FrameTracks]) -> None:
+    def add(self, video: _CountedVideo, frames: Iterable[FrameTracks]) -> None:
         """Count in the next video."""
         if self._ground:
             video.meter = SpeedMeter(self._ground, *self.size)
@@ -353,7 +355,9 @@ class _Group:
         return counts
 
 
-def _gap(before: _Video, saved: SavedTracks, video: _Video, frames: SavedTracks) -> float:
+def _gap(
+    before: _CountedVideo, saved: SavedTracks, video: _CountedVideo, frames: SavedTracks
+) -> float:
     """Return the seconds from the end of a video to the next one; negative if they overlap.
 
     Clocks with whole seconds do not measure small gaps; vehicles show overlaps. Raises `TruthError`

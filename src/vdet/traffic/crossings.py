@@ -49,7 +49,7 @@ class Line:
         return math.dist(self.start, self.end)
 
     @property
-    def reach(self) -> Segment:
+    def extended(self) -> Segment:
         """The line, extended where it ends at the edge of the frame: vehicles stand beyond it."""
         (ax, ay), (bx, by) = self.start, self.end
         factor = sum(self.size) / self.length
@@ -77,7 +77,7 @@ class Line:
         before, after = self.distances(np.array(path)).tolist()
         along = before / (before - after)
         (ax, ay), (bx, by) = path
-        (cx, cy), (dx, dy) = self.reach
+        (cx, cy), (dx, dy) = self.extended
         x, y = ax + along * (bx - ax) - cx, ay + along * (by - ay) - cy
         across = (x * (dx - cx) + y * (dy - cy)) / ((dx - cx) ** 2 + (dy - cy) ** 2)
         return along if 0 <= across <= 1 else None
@@ -224,7 +224,7 @@ def crossings(path: VehiclePath, border: Border) -> list[Crossing]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Run:
+class _SideRun:
     """Consecutive rows of a path on one side of a border, from row `start`.
 
     `height` is the minimum height of the box, pixels, of the rows in which the vehicle settles;
@@ -256,7 +256,7 @@ def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
                     yield Crossing(point.time, point.row, direction)
 
 
-def _runs(path: VehiclePath, border: Border) -> Iterator[_Run]:
+def _runs(path: VehiclePath, border: Border) -> Iterator[_SideRun]:
     """Yield the runs in which the vehicle settles; none if it stays on one side, except inside."""
     distances = border.distances(path.points)
     is_positive = distances >= 0
@@ -267,7 +267,7 @@ def _runs(path: VehiclePath, border: Border) -> Iterator[_Run]:
     for start, end in pairwise([0, *turns, len(is_positive)]):
         rows = start + np.flatnonzero(settles[start:end])
         if len(rows):
-            yield _Run(
+            yield _SideRun(
                 start,
                 is_positive=bool(is_positive[start]),
                 height=float(path.heights[rows].min()),

@@ -57,7 +57,7 @@ class Estimate:
         Estimate of the true number.
     low, high
         Its interval of 95 %.
-    more
+    minutes_to_precision
         How many more drawn minutes are expected to bring half of the width of the interval to 2 %
         of the true number; 0 if it is that narrow.
     """
@@ -67,7 +67,7 @@ class Estimate:
     true: float
     low: float
     high: float
-    more: int
+    minutes_to_precision: int
 
 
 def estimate(
@@ -100,7 +100,7 @@ def estimate(
     unchecked = np.array(sorted(set(range(len(traffic))) - set(checked)), np.int64)
     if len(unchecked) and len(sample) < MIN_CHECKED:
         return []
-    survey = _Survey(traffic, errors, sample, unchecked)
+    survey = _CheckedSample(traffic, errors, sample, unchecked)
     classes = sorted(set(counted) | {error.true for error in errors if error.true})
     groups = [(name, counted.get(name, np.zeros_like(traffic))) for name in classes]
     return [survey.estimate(name, np.asarray(group)) for name, group in [(None, traffic), *groups]]
@@ -145,7 +145,7 @@ class _Unchecked:
 
 
 @dataclass(frozen=True, slots=True)
-class _Survey:
+class _CheckedSample:
     """Counted minutes (traffic, (minutes,) int64), with the errors found in a sample of them."""
 
     traffic: Int64Array

@@ -72,7 +72,7 @@ def bands_of(borders: Sequence[Border]) -> list[Band]:
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class BandPassage:
     """A track passes a band.
 
     Attributes
@@ -115,7 +115,7 @@ class Passages:
     def __init__(self, bands: Sequence[Band]) -> None:
         self._bands = bands
         self._feet: dict[int, deque[_Foot]] = {}
-        self.by_band: list[list[Passage]] = [[] for _ in bands]
+        self.by_band: list[list[BandPassage]] = [[] for _ in bands]
 
     def add(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
@@ -138,7 +138,7 @@ class Passages:
                 position = meeting((band.start, band.end), step) or 0.0
                 x, y = (np.subtract(now.point, feet[0].point) / frames).tolist()
                 time = before.time + way * (now.time - before.time)
-                passages.append(Passage(track.id, time, position, (x, y), track.box.width))
+                passages.append(BandPassage(track.id, time, position, (x, y), track.box.width))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,7 +196,7 @@ class Sampling:
         return np.asarray(merged, np.uint8)
 
 
-def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:
+def sampling_of(band: Band, passages: Sequence[BandPassage]) -> Sampling:
     """Return where the pixels of a band lie, for the traffic that passed it.
 
     At each position, the band follows the mean way of the traffic there, of the direction that most
@@ -216,7 +216,7 @@ def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:
 
 
 def _velocities(
-    positions: Float64Array, passages: Sequence[Passage], along: Float64Array
+    positions: Float64Array, passages: Sequence[BandPassage], along: Float64Array
 ) -> Float64Array:
     """Return the movement in a frame at each position, pixels, `(n, 2)`."""
     normal = np.array([along[1], -along[0]]) / np.hypot(*along)

@@ -18,7 +18,7 @@ from vdet.errors import clock_text, quantity
 from vdet.findings import Finding
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts, Trace
-from vdet.traffic.strips import Band, Passage
+from vdet.traffic.strips import Band, BandPassage
 
 _SAMPLES = 64
 """Number of frames of which the median is the background."""
@@ -49,7 +49,7 @@ _INTERVAL = 300
 
 
 @dataclass(frozen=True, slots=True)
-class _Crossing:
+class _StripPassage:
     """A tracked vehicle in a strip: position and width, columns, and number of frames.
 
     `passed` is when its foot passed, as a fraction of these frames.
@@ -69,14 +69,14 @@ class TraceSearch:
         self._band = band
         self._frames: list[FrameTracks] = []
         self._rows: list[Image] = []
-        self._crossings: deque[_Crossing] = deque(maxlen=_LATEST)
+        self._crossings: deque[_StripPassage] = deque(maxlen=_LATEST)
         self._searched = -np.inf
 
     def search(
         self,
         frames: Sequence[FrameTracks],
         strips: Sequence[Image],
-        passages: Sequence[Passage],
+        passages: Sequence[BandPassage],
         *,
         is_end: bool,
     ) -> list[Trace]:
@@ -157,12 +157,12 @@ def _ids(band: Band, frames: Sequence[FrameTracks]) -> Int64Array:
     return ids
 
 
-def _crossing(shown: BoolArray, row: int, position: float) -> _Crossing:
+def _crossing(shown: BoolArray, row: int, position: float) -> _StripPassage:
     """Return how a vehicle crosses that covers a part of a strip, and whose foot is at a row."""
     rows = np.flatnonzero(shown.any(axis=1))
     width = shown.sum(axis=1).max() / (1 + 2 * _MARGIN)
     frames = (rows[-1] - rows[0] + 1) / (1 + 2 * _MARGIN)
-    return _Crossing(
+    return _StripPassage(
         position, float(width), float(frames), float((row - rows[0]) / frames - _MARGIN)
     )
 

@@ -8,7 +8,7 @@ import pytest
 from learn.net.blocks import block_picture, block_source
 from vdet.config.schema import NetworkTrainingSettings
 from vdet.learn.net.augmentation import (
-    DrawSettings,
+    ImageDrawing,
     Paster,
     SampleDrawer,
     repeat_factors,
@@ -17,13 +17,13 @@ from vdet.learn.net.augmentation import (
 from vdet.learn.net.sources import MAX_PIXELS, NetSample, NetSource
 from vdet.learn.net.weather import with_weather
 
-PLAIN = DrawSettings(width=256, height=128, magnified=1.0, mosaics=0.0)
-MOSAIC = DrawSettings(width=256, height=128, magnified=1.0, mosaics=1.0)
+PLAIN = ImageDrawing(width=256, height=128, magnified=1.0, mosaics=0.0)
+MOSAIC = ImageDrawing(width=256, height=128, magnified=1.0, mosaics=1.0)
 SETTINGS = NetworkTrainingSettings()
 WHITE = np.full((128, 256, 3), 255, np.uint8)
 
 
-def draw(seed: int, drawing: DrawSettings, source: NetSource | None = None) -> NetSample:
+def draw(seed: int, drawing: ImageDrawing, source: NetSource | None = None) -> NetSample:
     drawer = SampleDrawer([source or block_source(8)], SETTINGS)
     return drawer.draw(np.random.default_rng(seed), drawing)
 
@@ -58,7 +58,7 @@ def test_the_box_lies_around_what_it_is_the_box_of(seed: int) -> None:
 
 @pytest.mark.parametrize("drawing", [PLAIN, MOSAIC], ids=["plain", "mosaic"])
 def test_every_box_lies_in_the_picture_and_the_same_seed_draws_the_same(
-    drawing: DrawSettings,
+    drawing: ImageDrawing,
 ) -> None:
     sample, again, other = (draw(seed, drawing) for seed in (3, 3, 4))
     assert np.array_equal(sample.image, again.image)
@@ -74,7 +74,7 @@ def test_every_box_lies_in_the_picture_and_the_same_seed_draws_the_same(
 def test_a_vehicle_of_which_little_is_left_is_ignored() -> None:
     wide = np.array([[0, 0, 256, 128]], np.float32)
     source = NetSource("wide", [NetSample(WHITE, wide, np.array([0]), np.array([False]))])
-    drawing = DrawSettings(width=256, height=128, magnified=4.0, mosaics=0.0)
+    drawing = ImageDrawing(width=256, height=128, magnified=4.0, mosaics=0.0)
     assert all(draw(seed, drawing, source).ignored.all() for seed in range(5))
 
 

@@ -38,7 +38,7 @@ _MAX_SIGNS = 3  # signs in an image
 
 
 @dataclass(frozen=True, slots=True)
-class DrawSettings:
+class ImageDrawing:
     """How images are drawn at a training step.
 
     `width` and `height` are the size of the images, pixels; `magnified` multiplies all scales.
@@ -72,7 +72,7 @@ class SampleDrawer:
         self._chances = chances / chances.sum()
         self._paster = Paster(self._samples)
 
-    def draw(self, rng: np.random.Generator, drawing: DrawSettings) -> NetSample:
+    def draw(self, rng: np.random.Generator, drawing: ImageDrawing) -> NetSample:
         """Return one training image with the vehicles in it."""
         if rng.random() < drawing.mosaics:
             sample = self._mosaic(rng, drawing)
@@ -92,7 +92,7 @@ class SampleDrawer:
     def _pick(self, rng: np.random.Generator) -> NetSample:
         return self._samples[int(rng.choice(len(self._samples), p=self._chances))]
 
-    def _mosaic(self, rng: np.random.Generator, drawing: DrawSettings) -> NetSample:
+    def _mosaic(self, rng: np.random.Generator, drawing: ImageDrawing) -> NetSample:
         """Return four images that meet in a random point."""
         width, height = drawing.width, drawing.height
         x = round(width * rng.uniform(0.3, 0.7))

@@ -16,7 +16,7 @@ from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.errors import DataError
 from vdet.files import staged
-from vdet.learn.net.augmentation import DrawSettings, SampleDrawer
+from vdet.learn.net.augmentation import ImageDrawing, SampleDrawer
 from vdet.learn.net.export import export_network, start_from
 from vdet.learn.net.network import Batch, Network, Vehicles, class_weights, loss_of
 from vdet.learn.net.sources import NetSample, NetSource, join
@@ -177,12 +177,12 @@ def _draw_batch(drawer: SampleDrawer, settings: NetworkTrainingSettings, step: i
     return _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
 
 
-def _drawing(settings: NetworkTrainingSettings, step: int) -> DrawSettings:
+def _drawing(settings: NetworkTrainingSettings, step: int) -> ImageDrawing:
     width, height = settings.size
     mosaics = 0.0 if step >= (1 - _PLAIN) * settings.steps else _MOSAICS
     if step < _SMALL * settings.steps:
-        return DrawSettings(width // 2, height // 64 * 32, _MAGNIFIED, mosaics)
-    return DrawSettings(width, height, 1.0, mosaics)
+        return ImageDrawing(width // 2, height // 64 * 32, _MAGNIFIED, mosaics)
+    return ImageDrawing(width, height, 1.0, mosaics)
 
 
 def _to_batch(samples: Sequence[NetSample]) -> Batch:

@@ -72,7 +72,7 @@ function intervalWidths(gains, losses, sample, left, more) {
  * Estimate the true number of all vehicles (group null), then of each class.
  *
  * counted: { class: [vehicles in each minute] }; strata: the stratum of each minute; errors: [{ minute, counted, true }],
- * classes or null; checked, drawn: sets of minutes. Returns [{ group, counted, true, low, high, more }], empty if minutes
+ * classes or null; checked, drawn: sets of minutes. Returns [{ group, counted, true, low, high, minutesToPrecision }], empty if minutes
  * are left and fewer than MIN_CHECKED of the drawn ones are checked.
  */
 function estimateCounts({ counted, strata, errors, checked, drawn }) {
@@ -93,7 +93,7 @@ function estimateCounts({ counted, strata, errors, checked, drawn }) {
     const removed = errorsIn(error => isIn(error.counted) && !isIn(error.true));
     const sum = numbers => numbers.reduce((total, number) => total + number, 0);
     const corrected = sum(number) + sum(added) - sum(removed), total = { group, counted: sum(number) };
-    if (unchecked.length === 0) return { ...total, true: corrected, low: corrected, high: corrected, more: 0 };
+    if (unchecked.length === 0) return { ...total, true: corrected, low: corrected, high: corrected, minutesToPrecision: 0 };
     const size = traffic.map(vehicles => vehicles + 1), limit = sum(unchecked.map(minute => number[minute]));
     const gains = uncheckedErrors({ errors: added, size, strata, sample, unchecked, limit: Infinity });
     const losses = uncheckedErrors({ errors: removed, size: number, strata, sample, unchecked, limit });
@@ -101,6 +101,6 @@ function estimateCounts({ counted, strata, errors, checked, drawn }) {
     const [below, above] = intervalWidths(gains, losses, sample.length, unchecked.length, 0);
     let more = 0;
     while (more < unchecked.length && sum(intervalWidths(gains, losses, sample.length, unchecked.length, more)) > 2 * PRECISION * value) more++;
-    return { ...total, true: value, low: value - below, high: value + above, more };
+    return { ...total, true: value, low: value - below, high: value + above, minutesToPrecision: more };
   });
 }

@@ -262,7 +262,7 @@ function drawEstimate() {
   const rows = estimateCounts({ counted: data.counted, strata: data.strata, errors, checked: indices(state.checked),
     drawn: indices(state.sample?.minutes ?? []) });
   const text = row => `${row.group ?? "all"}: ${row.counted} counted, ${Math.round(row.true)} true ` +
-    `(${Math.round(row.low)} to ${Math.round(row.high)})` + (row.more ? `; ${counted(row.more, "more minute")} for ± 2 %` : "");
+    `(${Math.round(row.low)} to ${Math.round(row.high)})` + (row.minutesToPrecision ? `; ${counted(row.minutesToPrecision, "more minute")} for ± 2 %` : "");
   const words = state.sample ? "The estimate needs three checked minutes of the sample." : "Draw a sample for an estimate of the true count.";
   get("estimate").replaceChildren(...(rows.length ? rows.map(row => element("p", "", text(row))) : [element("p", "", words)]));
 }

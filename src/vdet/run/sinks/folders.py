@@ -221,7 +221,7 @@ _PRECISION = 1_000_000  # largest denominator of a time, seconds
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class ClipSpan:
     """A time span in which vehicles are shown, with its margins; seconds in the video."""
 
     start: float
@@ -245,15 +245,15 @@ def counted_vehicles(traffic: LiveTraffic) -> Sequence[VehicleRecord]:
     return [record for record in traffic.vehicles if counts is None or record.id in counted]
 
 
-def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
+def scenes(records: Iterable[VehicleRecord], margin: float) -> list[ClipSpan]:
     """Return the time spans of vehicles with margins, seconds; spans that touch are joined."""
-    found: list[Scene] = []
+    found: list[ClipSpan] = []
     for record in sorted(records, key=lambda record: record.first):
-        scene = Scene(record.first - margin, record.last + margin, (record,))
+        scene = ClipSpan(record.first - margin, record.last + margin, (record,))
         if found and scene.start <= found[-1].end:
             last = found.pop()
             vehicles = (*last.vehicles, record)
-            scene = Scene(last.start, max(scene.end, last.end), vehicles)
+            scene = ClipSpan(last.start, max(scene.end, last.end), vehicles)
         found.append(scene)
     return found
 
@@ -292,7 +292,7 @@ class ClipSink(BaseSink):
                 (folder / f"{name}.mp4").unlink(missing_ok=True)
                 log.warning("%s: the clip %s was not written: %s", source, name, error)
 
-    def _cut(self, scene: Scene, stem: Path) -> Path:
+    def _cut(self, scene: ClipSpan, stem: Path) -> Path:
         """Copy or encode a scene, and return its file; a part that cannot be copied is encoded."""
         video, sides = self.video, (scene.start, scene.end)
         start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)

@@ -15,7 +15,7 @@ from vdet.media import Picture
 from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
 from vdet.pages.batch import write_reviews
-from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, crop_name, write_review
+from vdet.pages.review import PAGE_NAME, EventMark, Review, StripPicture, crop_name, write_review
 from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.track.track import FrameTracks
@@ -23,7 +23,7 @@ from vdet.traffic.counts import Event, Trace
 from vdet.traffic.records import Crop
 from vdet.traffic.strips import (
     Band,
-    Passage,
+    BandPassage,
     Passages,
     Sampling,
     bands_of,
@@ -65,13 +65,13 @@ class _Strip:
     rows: list[tuple[float, Image]] = field(default_factory=list)
     passed: int = 0
 
-    def add(self, seconds: float, picture: Picture, passages: list[Passage]) -> None:
+    def add(self, seconds: float, picture: Picture, passages: list[BandPassage]) -> None:
         """Add a frame."""
         if len(passages) >= _ENOUGH:
             self.improve(passages)
         self.rows.append((seconds, self.sampling.cut(picture.layers)))
 
-    def improve(self, passages: list[Passage]) -> None:
+    def improve(self, passages: list[BandPassage]) -> None:
         """Choose the sampling by the passages so far, unless it was chosen by enough of them."""
         if self.passed < _ENOUGH:
             self.sampling, self.passed = sampling_of(self.band, passages), len(passages)
@@ -203,9 +203,9 @@ class ReviewSink(BaseSink):
             facts = self.context.facts
             facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
 
-    def _marks(self, events: Sequence[Event]) -> list[Mark]:
+    def _marks(self, events: Sequence[Event]) -> list[EventMark]:
         """Return where the counted events are."""
-        by_band_and_id: dict[tuple[int, int], list[Passage]] = defaultdict(list)
+        by_band_and_id: dict[tuple[int, int], list[BandPassage]] = defaultdict(list)
         for number, passages in enumerate(self._passages.by_band):
             for passage in passages:
                 by_band_and_id[number, passage.id].append(passage)
@@ -224,7 +224,7 @@ class ReviewSink(BaseSink):
             spots += [_Spot(_SAME, band, 0.5) for band in bands]  # if there is no passage
             spot = min(spots, default=_Spot(0.0, None, 0.5))
             seconds = round(event.time - self._start, 3)
-            marks.append(Mark(spot.band, seconds, round(spot.position, 3), event))
+            marks.append(EventMark(spot.band, seconds, round(spot.position, 3), event))
         return marks
 
 

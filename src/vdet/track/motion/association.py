@@ -136,7 +136,7 @@ def take_over_ids(vehicles: Sequence[TrackedVehicle]) -> list[TrackedVehicle]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Overlap:
+class _BoxOverlap:
     """How the box of a track overlaps that of another one.
 
     `inside` is the fraction of it that is inside the other box. `same` says how much the two show
@@ -181,7 +181,7 @@ def without_duplicates(
             higher = vehicles[at]
             if higher.unseen or not higher.confirmed:
                 continue
-            overlap = _Overlap(inside[row, at], same[row, at], alike[row, at])
+            overlap = _BoxOverlap(inside[row, at], same[row, at], alike[row, at])
             if not _show_one_vehicle(vehicle, higher, overlap, hidden):
                 continue
             if vehicle.confirmed and min(vehicle.age, higher.age) > _APART:
@@ -198,7 +198,7 @@ def without_duplicates(
 def _show_one_vehicle(
     vehicle: TrackedVehicle,
     higher: TrackedVehicle,
-    overlap: _Overlap,
+    overlap: _BoxOverlap,
     hidden: Sequence[TrackedVehicle],
 ) -> bool:
     """Return whether a track shows the vehicle of an overlapping one of higher rank, or a part.
