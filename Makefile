@@ -56,6 +56,7 @@ bench: $(TOOLS)  ## measure speed and memory, as ratios of one run
 
 soak: $(TOOLS)  ## check that nothing grows in a run of 20,000 frames (minutes, 1 GB in TMPDIR)
 	$(BIN)/python -m benchmarks.soak
+	$(BIN)/python -m benchmarks.soak --fixed
 
 folds: $(TOOLS)  ## check every threshold on frames that the model has not seen (after make model)
 	$(BIN)/python -m benchmarks.folds $(DATA)/project_video.mp4 $(TRUTH) \

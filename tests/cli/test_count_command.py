@@ -5,12 +5,13 @@ import json
 import re
 from pathlib import Path
 
+import av
 import numpy as np
 import openpyxl
 import pytest
 
 from conftest import Run
-from running import rows_of, write_drive
+from running import names, rows_of, write_drive
 from vdet.labels.reading import read_tracks
 from vdet.media.images import encode_image
 
@@ -163,6 +164,45 @@ def test_flows_have_clock_times_live_and_from_tracks(
         ("2026-05-01 06:55", "gate", "yard", "0"), ("2026-05-01 07:00", "gate", "yard", "1"),
     ]  # fmt: skip
     assert "from  to gate  to yard  to none" in result.out
+
+
+def test_times_count_from_the_first_frame_in_any_container(
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
+    with (
+        av.open(folder / "red.mp4") as source,
+        av.open(tmp_path / "red.ts", "w", container_options={"mpegts_copyts": "1"}) as target,
+    ):
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            if packet.dts is not None:
+                packet.pts, packet.dts = (
+                    (packet.pts or 0) + 3600 * 12_800,
+                    packet.dts + 3600 * 12_800,
+                )
+                packet.stream = stream
+                target.mux(packet)
+    part = ("--begin", "2026-05-01 07:00+00:00", "--start", "0.2", "--at", "1")
+    lines = ("-c", folder / "lines.yaml", *part[:2])
+    found = []
+    for video in (folder / "red.mp4", tmp_path / "red.ts"):
+        out = tmp_path / video.suffix[1:]
+        out.mkdir()
+        outputs = [
+            item
+            for sink, name in (
+                *(("tracks", "t.csv"), ("counts", "c.csv"), ("vehicles", "v.csv")),
+                *(("crops", "crops"), ("clips", "clips"), ("stages", "stages")),
+            )
+            for item in (f"--{sink}", out / name)
+        ]
+        run("detect-video", video, *red, "--no-video", *lines, *part[2:], *outputs, code=0)
+        run("count", out / "t.csv", *lines, "--counts", out / "again.csv", code=0)
+        tables = {path.name: path.read_text() for path in out.glob("*.csv")}
+        assert tables["again.csv"] == tables["c.csv"]
+        found.append((tables, [Path(name).with_suffix("") for name in names(out)]))
+    assert found[0] == found[1]
+    assert "2026-05-01 07:00:0" in found[0][0]["c.csv"]
 
 
 def write_tracks(path: Path, *, shift: int = 0) -> Path:

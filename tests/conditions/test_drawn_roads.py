@@ -10,7 +10,7 @@ from benchmarks.conditions import EXPECTED, SETTINGS, Road
 from vdet import load_settings
 from vdet.boxes import NO_BOXES
 from vdet.conditions import visibility
-from vdet.conditions.visibility import findings
+from vdet.conditions.visibility import VisibilityWatch
 from vdet.conditions.watch import Conditions, planes_of
 from vdet.config.schema import Code, ConditionSettings, Settings
 from vdet.media import Picture
@@ -39,9 +39,10 @@ def test_drops_are_reported_while_they_are_on_the_lens() -> None:
     seen = (*np.log((105, 15, 0.5)),)
     sharp = *seen, -4.0, -4.4, -2.0, 0.55, 0.1, 0.8
     soft_everywhere = *seen, -4.8, -4.6, -0.9, 0.35, 0.5, 0.45
-    times = np.arange(60) / 4
-    looks = np.array([soft_everywhere if 5 <= time < 10 else sharp for time in times])
-    (finding,) = findings(times, looks, is_shipped=True)
+    watch = VisibilityWatch(is_shipped=True)
+    for time in (np.arange(60) / 4).tolist():
+        watch.add(time, np.array(soft_everywhere if 5 <= time < 10 else sharp), is_wet=False)
+    (finding,) = watch.findings()
     assert (finding.code, finding.severity) == ("drops", "warning")
     assert finding.spans == ((5.0, 9.75),)
     assert "on the lens from 0:05 to 0:09" in finding.text

@@ -1,13 +1,14 @@
 """Labels, and the texts and numbers that they are read from."""
 
 import math
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from labels.saving import checked_video, row
 from vdet.errors import TruthError
-from vdet.labels.label import NO_ID, Label, SavedTracks
+from vdet.labels.label import NO_ID, Label, SavedTracks, SourceVideo
 from vdet.labels.parsing import numbered_lines
 
 
@@ -16,6 +17,37 @@ def test_until_keeps_the_frames_up_to_the_last() -> None:
     part = checked_video(rows).until(3)
     assert [label.frame for label in part.labels] == [1, 1, 2, 2]
     assert part.length == 3
+
+
+NOW = 1_777_618_800.0
+
+
+@pytest.mark.parametrize(
+    ("times", "rate", "expected"),
+    [
+        ({0: 0.0, 2: 0.08}, None, {0: 0.0, 2: 0.08}),
+        ({0: 1.4, 2: 1.48}, None, {0: 0.0, 2: 0.08}),
+        ({0: -0.12, 2: -0.04}, None, {0: 0.0, 2: 0.08}),
+        ({37: 3601.48, 38: 3601.52}, None, {37: 1.48, 38: 1.52}),
+        ({10: NOW + 1, 12: NOW + 1.2}, 10.0, {10: 1.0, 12: 1.2}),
+        ({1500: 63.0, 1501: 63.04}, None, {1500: 63.0, 1501: 63.04}),  # the rate varies
+        ({25: 1.0}, 25.0, {25: 1.0}),
+    ],
+)
+def test_times_count_from_the_first_frame_of_the_video(
+    times: dict[int, float], rate: float | None, expected: dict[int, float]
+) -> None:
+    begin = datetime(2026, 5, 1, 7, tzinfo=UTC)
+    saved = SavedTracks((), times=times, begin=begin, video=SourceVideo("a.ts", 9, 9, rate=rate))
+    counted = saved.from_first_frame()
+    assert counted.times == pytest.approx(expected, abs=1e-5)
+    assert counted.begin is not None
+    moments = [
+        [(tracks.begin + timedelta(seconds=time)).timestamp() for time in tracks.times.values()]
+        for tracks in (saved, counted)
+        if tracks.begin
+    ]
+    assert moments[0] == pytest.approx(moments[1]), "the clock times are the same"
 
 
 FILE = Path("gt.txt")

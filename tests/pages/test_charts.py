@@ -2,7 +2,9 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from fractions import Fraction
+from zoneinfo import ZoneInfo
 
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from vdet.errors import clock_text
 from vdet.pages import charts
 from vdet.pages.charts import interval_plot, number_axis, time_axis, time_text
+from vdet.traffic.clock import Clock
 
 
 @pytest.mark.parametrize(
@@ -47,12 +50,20 @@ def test_the_series_of_an_interval_are_stacked_and_named_with_their_sums() -> No
 
 
 def test_a_time_axis_may_show_the_time_of_the_day() -> None:
-    seven = 7 * 3600 + 30.0
+    zone = ZoneInfo("Europe/Berlin")
+    seven, late, change = (
+        Clock(datetime.fromisoformat(text).replace(tzinfo=zone).astimezone(UTC), "", zone).at
+        for text in ("2026-05-01 07:00:30", "2026-05-01 23:59:30", "2026-10-25 00:50")
+    )
     assert time_axis(0, 120, seven).ticks == [
         (0, "07:00:30"), (30, "07:01"), (60, "07:01:30"), (90, "07:02"), (120, "07:02:30"),
     ]  # fmt: skip
-    late = [text for _, text in time_axis(0, 120, 86370).ticks]
-    assert late == ["23:59:30", "00:00", "00:00:30", "00:01", "00:01:30"]
+    texts = [text for _, text in time_axis(0, 120, late).ticks]
+    assert texts == ["23:59:30", "00:00", "00:00:30", "00:01", "00:01:30"]
+    texts = [text for _, text in time_axis(0, 4 * 3600, change).ticks]
+    assert texts == ["01:00", "02:00", "02:00", "03:00"]
+    texts = [text for _, text in time_axis(0, 10 * 3600, change).ticks]
+    assert texts == ["02:00", "02:00", "04:00", "06:00", "08:00"]
 
 
 @given(

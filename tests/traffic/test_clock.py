@@ -1,8 +1,10 @@
 """When a video begins, and where that is known from."""
 
 import os
+import struct
 import time
 from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from vdet.errors import ConfigError
 from vdet.labels.label import SavedTracks
 from vdet.media.frame import Tags
 from vdet.media.reader import VideoReader
+from vdet.traffic import clock as clock_module
 from vdet.traffic.clock import Clock, Intervals, find_clock
 
 
@@ -25,6 +28,7 @@ from vdet.traffic.clock import Clock, Intervals, find_clock
 def time_zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The zone of the computer: two hours before UTC in summer, one in winter."""
     monkeypatch.setitem(os.environ, "TZ", "CET-1CEST")
+    monkeypatch.setattr(clock_module, "now", lambda: datetime(2026, 12, 1, tzinfo=UTC))
     time.tzset()
     yield
     monkeypatch.undo()
@@ -50,7 +54,6 @@ def clock_of(
     name: str | Path,
     given: str | None = None,
     created: str | None = None,
-    start: float = 0.0,
     *,
     pattern: str | None = None,
     zone: str | None = None,
@@ -60,7 +63,7 @@ def clock_of(
     camera = CameraSettings(clock=ClockSettings(pattern=pattern, zone=zone))
     settings = Settings(input=InputSettings(begin=given), camera=camera)
     tags = Tags(created, exporter=exporter)
-    return find_clock(Path("clips", name), settings, start, tags=tags, length=length)
+    return find_clock(Path("clips", name), settings, tags=tags, length=length)
 
 
 def test_a_time_that_is_given_is_taken() -> None:
@@ -140,7 +143,7 @@ def test_a_pattern_has_folders_halves_of_days_zones_and_short_numbers(
 def test_saved_tracks_of_another_name_keep_their_clock() -> None:
     settings = Settings(camera=CameraSettings(clock=ClockSettings(pattern="%Y/%m/%d/%H.%M")))
     saved = SavedTracks((), begin=parse_date_time("2026-05-01 07:00+02:00"))
-    clock = find_clock(Path("05.33.jsonl"), settings, 0.0, saved=saved)
+    clock = find_clock(Path("05.33.jsonl"), settings, saved=saved)
     assert str(clock) == "2026-05-01 07:00:00+02:00 (from the file)"
 
 
@@ -176,12 +179,18 @@ def test_a_creation_time_at_the_end_of_the_video_is_no_contradiction(
     assert caplog.messages == []
 
 
-def test_the_creation_time_of_an_exported_file_is_doubtful(
-    caplog: pytest.LogCaptureFixture,
+@pytest.mark.parametrize(
+    ("created", "exporter", "text"),
+    [
+        ("2026-05-01T05:00Z", "x", "2026-05-01 07:00:00+02:00 (its creation time, perhaps of an e"),
+        ("2027-05-01T05:00Z", None, "2027-05-01 07:00:00+02:00 (its creation time, in the future)"),
+    ],
+)
+def test_the_creation_time_of_an_exported_file_is_doubtful_and_so_is_the_future(
+    created: str, exporter: str | None, text: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    created = clock_of("a.mp4", None, "2026-05-01T05:00:00Z", exporter="HandBrake 1.6.1")
-    text = "2026-05-01 07:00:00+02:00 (its creation time, perhaps of an export)"
-    assert str(created) == text
+    text = text.replace("an e", "an export)") if exporter else text
+    assert str(clock_of("a.mp4", None, created, exporter=exporter)) == text
     assert caplog.messages == [f"clips/a.mp4: may not begin {text}; input.begin overrides it"]
 
 
@@ -198,12 +207,59 @@ def test_the_clock_of_tracks_is_as_doubtful_as_that_of_their_video(
     assert f"{tracks}: may not begin {text}; input.begin overrides it" in again.err
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "is_doubtful"),
+    [
+        (b"VideoHandler", b"VideoHandler", False),
+        (b"VideoHandler", b"GPAC ISO Vid", True),
+        (b"VideoHandler", b"L-SMASH Vide", True),
+        (b"ftypisom", b"ftypdash", True),
+        (b"isomiso2", b"isomdash", True),
+        (b"Xavf", b"Lavf", True),
+        (b"VideoHandler", b"Dashcam Vid.", False),
+    ],
+)
+def test_a_file_that_was_wrapped_again_has_no_sure_clock(
+    tmp_path: Path, old: bytes, new: bytes, *, is_doubtful: bool
+) -> None:
+    path = write_copy(tmp_path / "a.mp4", creation_time="2026-05-01T05:00:00Z")
+    written = path.read_bytes().replace(b"Lavf", b"Xavf")
+    assert old in written
+    path.write_bytes(written.replace(old, new))
+    with VideoReader(path) as reader:
+        clock = find_clock(path, Settings(), tags=reader.info.tags)
+    assert clock is not None
+    assert clock.is_doubtful == is_doubtful
+
+
 def test_the_key_of_apple_has_the_zone_and_is_not_of_an_export(tmp_path: Path) -> None:
     tags = {"com.apple.quicktime.creationdate": "2026-05-01T07:00:00-0300"}
     path = write_copy(tmp_path / "a.mov", creation_time="2026-06-01T00:00:00Z", **tags)
     with VideoReader(path) as reader:
-        clock = find_clock(path, Settings(), 0.0, tags=reader.info.tags)
+        clock = find_clock(path, Settings(), tags=reader.info.tags)
     assert str(clock) == "2026-05-01 07:00:00-03:00 (its creation time)"
+
+
+def write_dav(path: Path) -> Path:
+    """Write a recording of a camera whose clock says 7:00."""
+    with av.open(write_clip(path.with_suffix(".h264"))) as source:
+        packets = [bytes(packet) for packet in source.demux(video=0) if packet.size]
+    date = 26 << 26 | 5 << 22 | 1 << 17 | 7 << 12  # a year has six bits, a minute and a second too
+    extension = bytes([0x80, 0, 160 // 8, 96 // 8, 0x81, 0, 4, 25])  # the size; H.264, 25 a second
+    with path.open("wb") as file:
+        for number, packet in enumerate(packets):
+            length = 24 + len(extension) + len(packet) + 8
+            head = struct.pack("<4s4B3IH2B", b"DHAV", 0xFD, 1, 0, 0, number, length, date,
+                               40 * number, len(extension), 0)  # fmt: skip
+            file.write(head + extension + packet + struct.pack("<4sI", b"dhav", length))
+    return path
+
+
+def test_the_times_of_a_dav_recording_are_the_clock_of_its_camera(tmp_path: Path) -> None:
+    with VideoReader(write_dav(tmp_path / "a.dav")) as reader:
+        assert [float(frame.time) for frame in reader][:3] == [0, 0.04, 0.08]
+        clock = find_clock(tmp_path / "a.dav", Settings(), tags=reader.info.tags)
+    assert str(clock) == "2026-05-01 07:00:00+02:00 (its creation time)"
 
 
 def test_pictures_that_are_named_by_the_clock_say_when_they_begin(tmp_path: Path) -> None:
@@ -221,22 +277,24 @@ def test_a_pattern_says_how_the_time_is_written() -> None:
         clock_of("b.mp4", pattern="%Y_%H%M")
 
 
-def test_the_beginning_is_that_of_the_first_frame() -> None:
-    found = clock_of("a.ts", "2026-05-01 07:00+02:00", start=86_400.0)
-    assert found is not None
-    assert str(found) == "2026-05-01 07:00:00+02:00 (as given)"
-    assert found.at(86_410.0).isoformat() == "2026-05-01T07:00:10+02:00"
-
-
-def test_a_first_frame_centuries_after_the_start_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"a\.ts: its first frame is at 1e\+11 s; times must be"):
-        clock_of("a.ts", "2026-05-01 07:00+02:00", start=1e11)
-
-
 BERLIN = "Europe/Berlin"
 
 
 class TestZone:
+    def test_of_saved_tracks_is_that_of_this_computer_if_their_offset_is(self) -> None:
+        os.environ["TZ"] = "CET-1CEST,M3.5.0,M10.5.0/3"
+        time.tzset()
+        live = clock_of("20261025_015000.mp4")
+        assert live is not None
+        for offset, later in (("+02:00", "2026-10-25 02:50:00+01:00"), ("-03:00", None)):
+            saved = SavedTracks((), begin=parse_date_time(f"2026-10-25 01:50:00{offset}"))
+            clock = find_clock(Path("a"), Settings(), saved=saved)
+            assert clock is not None
+            assert str(clock.at(7200)) == (later or "2026-10-25 03:50:00-03:00")
+            spans = [(0.0, 7200.0)]
+            periods = [Intervals([(c, spans)], 3600).periods for c in (live, clock)]
+            assert (periods[0] == periods[1]) == (later is not None)
+
     @pytest.mark.parametrize(
         ("name", "zone", "text"),
         [
@@ -306,7 +364,7 @@ class TestZone:
         time.tzset()
         texts = "2026-03-07 12:00-05:00", "2026-03-10 12:00-04:00"
         saved = [SavedTracks((), begin=parse_date_time(text)) for text in texts]
-        clocks = [find_clock(Path("a"), Settings(), 0.0, saved=tracks) for tracks in saved]
+        clocks = [find_clock(Path("a"), Settings(), saved=tracks) for tracks in saved]
         periods = Intervals([(clock, [(0.0, 60.0)]) for clock in clocks], 86_400).periods
         assert [str(period.start) for period in periods] == [
             "2026-03-07 00:00:00-05:00", "2026-03-10 00:00:00-04:00",

@@ -1,9 +1,10 @@
 """The workbook of a survey: every sheet, as a spreadsheet reads it."""
 
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import openpyxl
@@ -12,6 +13,7 @@ import pytest
 from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.findings import Finding
+from vdet.pages.traffic import page_table
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Corrected, Counts, Event
 from vdet.traffic.estimate import Estimate
@@ -54,6 +56,19 @@ def counts(begin: datetime, seconds: float, *events: Event, **values: Any) -> Co
         clock=Clock(begin, "from its name", begin.tzinfo),
         **values,
     )
+
+
+def test_times_show_their_offset_where_the_clock_changes(tmp_path: Path) -> None:
+    zone = ZoneInfo("Europe/Berlin")
+    night = counts(datetime(2026, 10, 25, 0, 10, tzinfo=UTC), 4500)
+    assert night.clock
+    changing = {"night": replace(night, clock=replace(night.clock, zone=zone))}
+    for number, (videos, form) in enumerate(((changing, " +0200"), (morning(), ""))):
+        write_workbook(tmp_path / f"{number}.xlsx", Survey(videos, settings()).sheets())
+        sheet = openpyxl.load_workbook(tmp_path / f"{number}.xlsx")["Intervals"]
+        assert sheet["A2"].number_format == "yyyy-mm-dd hh:mm:ss" + (f'"{form}"' if form else "")
+    text = page_table(Survey(changing, settings()).files())[1][0]
+    assert text[1:3] == ["2026-10-25 02:10:00 +0200", "2026-10-25 02:25:00 +0100"]
 
 
 def morning() -> dict[str, Counts]:

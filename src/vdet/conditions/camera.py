@@ -5,7 +5,9 @@ Corners (Shi and Tomasi 1994) of a reference plane are tracked into later ones (
 vehicles.
 """
 
+import copy
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from vdet.boxes import Box, Float32Array, Float64Array, Image
 from vdet.errors import clock_text
 from vdet.findings import Finding
-from vdet.traffic.clock import joined, when
+from vdet.traffic.clock import GAP, Span, when
 
 _LIMIT = 0.01
 """Displacement of a camera that is not reported, as a fraction of the frame's width."""
@@ -31,6 +33,8 @@ _RENEWED = 30.0
 """Seconds after which corners are chosen again, because the light changes."""
 _LOST = 3.0
 """Seconds after which a lost view is another view: a lorry does not hide everything for so long."""
+_USUAL, _MAX_POSITIONS = 5, 400
+"""Number of known positions that give the usual one, and of those kept to see whether it rests."""
 _STILL = 0.9
 """Minimum fraction of planes in which a fixed camera has not moved since the previous one."""
 
@@ -41,12 +45,12 @@ class CameraWatch:
     def __init__(self) -> None:
         self._even = cv2.createCLAHE(4, (10, 6))
         """Equalizes contrast, against changes of light and fog (Zuiderveld 1994)."""
-        self._times: list[float] = []
-        self._positions: list[Float64Array] = []
-        """Displacements of the corners of the frame since the start, `(4, 2)` each, fractions of
-        the width: infinite in another view, NaN if unknown.
+        self._displacement = _Displacement()
+        self._position = np.zeros((4, 2))
+        """Displacement of the corners of the frame since the start, fractions of the width:
+        infinite in another view, NaN if unknown.
         """
-        self._still_planes = self._lost_planes = 0
+        self._planes = self._still_planes = self._lost_planes = 0
         self._plane: Image | None = None
         self._points = np.empty((0, 1, 2), np.float32)
         self._reference = np.zeros((4, 2))
@@ -61,13 +65,13 @@ class CameraWatch:
         plane = np.asarray(self._even.apply(plane), np.uint8)
         moved = self._moved(plane, np.inf if is_clear else np.nan)
         position = self._reference + moved / plane.shape[1]
-        before = self._positions[-1] if self._positions else position
         with np.errstate(invalid="ignore"):  # both may be other views
-            is_steady = bool(np.abs(position - before).max() <= _LIMIT / 2)
+            is_steady = bool(np.abs(position - self._position).max() <= _LIMIT / 2)
+        self._planes += 1
         self._still_planes += is_steady
         self._lost_planes += bool(np.isinf(position).any())
-        self._times.append(time)
-        self._positions.append(position)
+        self._position = position
+        self._displacement.add(time, position)
         is_old = time - self._since > _RENEWED and np.isfinite(position).all()
         if is_old or len(self._points) < _MIN_POINTS:
             if np.abs(moved).max() > _ERROR:  # so that small errors do not add up
@@ -78,36 +82,28 @@ class CameraWatch:
     @property
     def is_still(self) -> bool:
         """Whether the camera was fixed most of the time."""
-        return len(self._times) > 1 and not self.is_moving
+        return self._planes > 1 and not self.is_moving
 
     @property
     def is_moving(self) -> bool:
         """Whether it moved in more than a tenth of the planes so far."""
-        return self._still_planes < _STILL * len(self._times)
+        return self._still_planes < _STILL * self._planes
 
     @property
     def travels(self) -> bool:
         """Whether it showed other views in more than a tenth of the planes so far."""
-        return self._lost_planes > (1 - _STILL) * len(self._times)
+        return self._lost_planes > (1 - _STILL) * self._planes
 
     def findings(self) -> list[Finding]:
         """Return when the camera moved, or when it was moved permanently."""
-        times, positions = np.array(self._times), np.array(self._positions)
-        is_known = np.isfinite(positions).all(axis=(1, 2))
-        off = _distances(positions, positions[is_known][:5])
-        spans = [
-            (first, last)
-            for first, last in joined(times[off > _LIMIT].tolist())
-            if last - first >= _LOST or (is_known & (times >= first) & (times <= last)).sum() > 1
-        ]
+        displacement = copy.deepcopy(self._displacement)
+        displacement.end()
+        spans, size = displacement.spans, displacement.size
         if not spans:
             return []
-        size = float(off[is_known].max())
         extent = f"by up to {size:.1%} of the width" if size > _LIMIT else "to another view"
         start, end = spans[-1]
-        after = positions[is_known & (times > start + 1)]
-        rests = len(after) > 3 and np.quantile(_distances(after, after), 0.95) <= _LIMIT
-        if rests and end == times[-1]:
+        if displacement.rests:
             text = (
                 f"the camera moved at {clock_text(int(start))}, {extent}: lines, zones and regions "
                 "match only one part; process the two parts separately"
@@ -146,10 +142,106 @@ class CameraWatch:
         return np.full((4, 2), 0.0 if agreement >= _IN_PLACE else lost)
 
 
+@dataclass(slots=True)
+class _Span:
+    """A time span in which the camera is displaced, with the number of known positions before it.
+
+    `known` is that up to `last`; `positions` are some of those from a second after `first`.
+    """
+
+    first: float
+    last: float
+    known_before: int
+    known: int
+    positions: list[Float64Array] = field(default_factory=list)
+    step: int = 1
+    skipped: int = 0
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is no single position, which may be wrong."""
+        return self.last - self.first >= _LOST or self.known > self.known_before + 1
+
+    def add(self, position: Float64Array) -> None:
+        """Keep every position, or fewer if there are many."""
+        self.skipped += 1
+        if self.skipped >= self.step:
+            self.skipped = 0
+            self.positions.append(position)
+        if len(self.positions) > _MAX_POSITIONS:
+            self.positions, self.step = self.positions[::2], 2 * self.step
+
+
+class _Displacement:
+    """When the camera was displaced from its first known positions, in figures that do not grow.
+
+    Attributes
+    ----------
+    spans
+        When, seconds.
+    size
+        Maximum displacement, as a fraction of the frame's width.
+    """
+
+    def __init__(self) -> None:
+        self.spans: list[Span] = []
+        self.size = 0.0
+        self._first: list[tuple[float, Float64Array]] = []  # until the usual position is known
+        self._usual: Float64Array | None = None
+        self._span: _Span | None = None
+        self._known, self._time = 0, 0.0
+
+    def add(self, time: float, position: Float64Array) -> None:
+        """Add the next position, `(4, 2)`."""
+        self._first.append((time, position))
+        if self._usual is not None or sum(np.isfinite(p).all() for _, p in self._first) >= _USUAL:
+            self._compare_first()
+
+    def _compare_first(self) -> None:
+        known = [position for _, position in self._first if np.isfinite(position).all()]
+        if self._usual is None:
+            self._usual = np.median(known, axis=0) if known else np.full((4, 2), np.nan)
+        for time, position in self._first:
+            self._compare(time, position, float(_distances(position, self._usual)))
+        self._first = []
+
+    def _compare(self, time: float, position: Float64Array, off: float) -> None:
+        is_known, self._time = bool(np.isfinite(position).all()), time
+        if is_known:
+            self.size = max(self.size, off)
+        if off > _LIMIT:
+            if self._span and time - self._span.last > GAP:
+                self._close()
+            self._span = self._span or _Span(time, time, self._known, self._known)
+            self._span.last, self._span.known = time, self._known + is_known
+        self._known += is_known
+        if self._span and is_known and time > self._span.first + 1:
+            self._span.add(position)
+
+    def _close(self) -> None:
+        if self._span and self._span.is_sure:
+            self.spans.append((self._span.first, self._span.last))
+        self._span = None
+
+    def end(self) -> None:
+        """Complete the spans, after the last position."""
+        self._compare_first()
+        span = self._span
+        self._close()
+        after = np.array(span.positions if span else [])
+        self.rests = bool(
+            span
+            and span.is_sure
+            and span.last == self._time
+            and len(after) > 3
+            and np.quantile(_distances(after, np.median(after, axis=0)), 0.95) <= _LIMIT
+        )
+
+
 def _distances(positions: Float64Array, usual: Float64Array) -> Float64Array:
-    """Return the mean distance of the corners from the median of the usual positions, `(n,)`."""
-    x, y = np.moveaxis(positions - np.median(usual, axis=0), -1, 0)
-    return np.asarray(np.hypot(x, y).mean(axis=1))
+    """Return the mean distance of the corners from a usual position, `(...)`."""
+    x, y = np.moveaxis(positions - usual, -1, 0)
+    return np.asarray(np.hypot(x, y).mean(axis=-1))
 
 
 def _edges(plane: Image) -> Float32Array:

@@ -5,9 +5,12 @@ two logistic regressions: for the recall, and for the probability of water on th
 """
 
 import json
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from functools import cache
 from importlib.resources import files
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -16,7 +19,7 @@ import numpy.typing as npt
 from vdet.boxes import BoolArray, Float64Array, Image
 from vdet.config.schema import Code
 from vdet.findings import Finding, Severity
-from vdet.traffic.clock import joined, when
+from vdet.traffic.clock import GAP, Span, extend, when
 
 Codes = npt.NDArray[np.str_]
 """Reasons for poor visibility, `(n,)`: keys of `WORDS`, empty where visibility is good."""
@@ -126,33 +129,72 @@ def probability(weights: Sequence[float], measures: Float64Array) -> Float64Arra
     return np.asarray(1 / (1 + np.exp(-(measures @ weights[:-1] + weights[-1]))))
 
 
-def findings(
-    times: Float64Array,
-    measures: Float64Array,
-    wet: BoolArray | bool = False,
-    *,
-    is_shipped: bool,
-) -> list[Finding]:
-    """Return when visibility is poor, for each reason.
+class VisibilityWatch:
+    """Watches the visibility in one video, in figures that do not grow.
 
-    `times` are `(n,)`; see `reasons` for the measures. `is_shipped` says whether the shipped
-    network is used, whose recall is known.
+    Parameters
+    ----------
+    is_shipped
+        Whether the shipped network is used, whose recall is known.
     """
-    reported: list[Finding] = []
-    if len(times) < _AROUND:
+
+    def __init__(self, *, is_shipped: bool) -> None:
+        self._is_shipped = is_shipped
+        self._latest = deque[_Look](maxlen=_AROUND)
+        self._is_enough = False  # whether there are `_AROUND` planes
+        self._spans = {code: list[Span]() for code in WORDS}
+        self._recalls = {code: [0.0, 0] for code in WORDS}  # sums and numbers
+
+    def add(self, time: float, measures: Float64Array, *, is_wet: bool) -> bool:
+        """Add a plane with its measures, `(9,)`; return whether visibility is good in it.
+
+        `is_wet` as in `reasons`.
+        """
+        code = str(reasons(measures[np.newaxis], is_wet)[0])
+        recall = float(probability(read_weights()["recall"], measures))
+        self._latest.append(_Look(time, code, recall))
+        self._is_enough = self._is_enough or len(self._latest) == _AROUND
+        if len(self._latest) > _AROUND // 2:
+            self._count(self._latest[-1 - _AROUND // 2], self._latest)
+        return not code
+
+    def _count(self, look: "_Look", nearby: Iterable["_Look"]) -> None:
+        """Count a plane with the most frequent reason of those around it."""
+        codes = [each.code for each in nearby]
+        usual = max(("", *WORDS), key=codes.count)
+        for code in WORDS:
+            if code == usual:
+                extend(self._spans[code], look.time, GAP)
+                self._recalls[code][0] += look.recall
+                self._recalls[code][1] += 1
+            elif (spans := self._spans[code]) and look.time - spans[-1][1] > GAP:
+                spans[-1:] = [span for span in spans[-1:] if span[1] - span[0] >= _SHORTEST]
+
+    def findings(self) -> list[Finding]:
+        """Return when visibility was poor so far, for each reason."""
+        reported: list[Finding] = []
+        if not self._is_enough:
+            return reported
+        whole, latest = deepcopy(self), list(self._latest)
+        for number in range(_AROUND // 2, 0, -1):
+            whole._count(latest[-number], latest[_AROUND // 2 + 1 - number :])
+        for code, words in WORDS.items():
+            spans = tuple(span for span in whole._spans[code] if span[1] - span[0] >= _SHORTEST)
+            if not spans:
+                continue
+            part, effect = None, "fewer vehicles are detected in such images"
+            if self._is_shipped:
+                part = whole._recalls[code][0] / whole._recalls[code][1]
+                effect = f"in such images the network finds about {10 * part:.0f} of 10 vehicles"
+            severity: Severity = "note" if part and part >= _MIN_RECALL else "warning"
+            text = f"{words} {when(spans)}: {effect}"
+            reported.append(Finding(code, text, spans, severity, part))
         return reported
-    codes, recall = reasons(measures, wet), probability(read_weights()["recall"], measures)
-    nearby = [np.convolve(codes == code, np.ones(_AROUND), "same") for code in ("", *WORDS)]
-    usual = np.array(["", *WORDS])[np.argmax(nearby, axis=0)]
-    for code, words in WORDS.items():
-        spans = tuple(joined(times[usual == code].tolist(), _SHORTEST))
-        if not spans:
-            continue
-        part, effect = None, "fewer vehicles are detected in such images"
-        if is_shipped:
-            part = float(recall[usual == code].mean())
-            effect = f"in such images the network finds about {10 * part:.0f} of 10 vehicles"
-        severity: Severity = "note" if part and part >= _MIN_RECALL else "warning"
-        text = f"{words} {when(spans)}: {effect}"
-        reported.append(Finding(code, text, spans, severity, part))
-    return reported
+
+
+class _Look(NamedTuple):
+    """A plane: its time, the reason for poor visibility, and the recall of the network."""
+
+    time: float
+    code: str
+    recall: float

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Float64Array, Image
+from vdet.boxes import Box, Boxes, Image
 from vdet.conditions import visibility
 from vdet.conditions.camera import CameraWatch
 from vdet.conditions.motion import MotionWatch
@@ -38,23 +38,22 @@ class Conditions:
         self._width = width
         lines = {line.name: (line.start, line.end) for line in settings.traffic.lines}
         self._camera, self._motion, self._weak = CameraWatch(), MotionWatch(lines), WeakWatch()
-        self._times: list[float] = []
-        self._measures: list[Float64Array] = []
-        self._wet: list[bool] = []
+        is_shipped = settings.detector.kind == "net" and settings.detector.model is None
+        self._visibility = visibility.VisibilityWatch(is_shipped=is_shipped)
+        self._time: float | None = None
 
     def add(
         self, time: float, picture: Picture, detections: Boxes, tracks: Sequence[Track]
     ) -> None:
         """Add a searched frame, with its detections and the vehicles shown."""
-        if self._times and time - self._times[-1] < _STEP:
+        if self._time is not None and time - self._time < _STEP:
             return
+        self._time = time
         fine_plane, plane = planes_of(picture)
         scale = plane.shape[1] / picture.width
         boxes = {track.id: _enlarged(track.box, scale) for track in tracks}
-        self._times.append(time)
-        self._measures.append(visibility.measure(fine_plane, plane, detections.scores))
-        self._wet.append(is_wet(fine_plane))
-        is_clear = not visibility.reasons(self._measures[-1][np.newaxis], self._wet[-1])[0]
+        measures = visibility.measure(fine_plane, plane, detections.scores)
+        is_clear = self._visibility.add(time, measures, is_wet=is_wet(fine_plane))
         is_steady = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
         self._motion.add(time, plane, boxes, is_steady=is_steady)
         self._weak.add(time, picture, detections, tracks)
@@ -66,15 +65,13 @@ class Conditions:
 
     def findings(self) -> Findings:
         """Return the findings so far, except those that the settings suppress."""
-        settings, detector = self._settings, self._settings.detector
-        findings = []
+        settings, findings = self._settings, []
         if settings.lack_of_metres:
             findings.append(Finding("lane-geometry", settings.lack_of_metres, severity="note"))
         if self._width < _NARROW:
             text = f"frames are {self._width} pixels wide; detectors were measured on wider ones"
             findings.append(Finding("small-frames", text, severity="note"))
-        if self._times:
-            times, measures = np.array(self._times), np.array(self._measures)
+        if self._time is not None:
             camera = self._camera.findings()
             has_places = settings.traffic or settings.regions or settings.camera.ground
             findings += at_places(camera) if has_places else camera
@@ -82,9 +79,7 @@ class Conditions:
                 findings += self._motion.findings()
             elif self._camera.travels:
                 findings += self._weak.findings()
-            is_shipped = detector.kind == "net" and detector.model is None
-            wet = np.array(self._wet)
-            findings += visibility.findings(times, measures, wet, is_shipped=is_shipped)
+            findings += self._visibility.findings()
         chosen = without(findings, settings.conditions.ignore)
         facts = tuple(item for item in chosen if item.severity == "fact")
         items = tuple(item for item in chosen if item.severity != "fact")

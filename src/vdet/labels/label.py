@@ -6,7 +6,7 @@ The checks that apply to every format are here too.
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -21,6 +21,9 @@ from vdet.config.classes import standard_class
 from vdet.errors import TruthError
 from vdet.findings import Finding
 from vdet.track.track import FrameTracks, Track
+
+_VARIES = 0.1
+"""Maximum deviation of the mean frame rate at the start of a file from that after it."""
 
 NO_ID = -1
 """Id of a box without an id; in video, only ignore regions may have it."""
@@ -166,7 +169,7 @@ class SavedTracks:
     size
         Width and height of the frames in pixels; None if the file does not contain them.
     begin
-        The moment of time 0, if the file has it.
+        The moment of time 0, the first frame of the video, if the file has it.
     begin_source
         Where that is from.
     video
@@ -195,6 +198,29 @@ class SavedTracks:
     def first_time(self) -> float:
         """Time of the first frame, seconds; 0 if there is none."""
         return min(self.times.values(), default=0.0)
+
+    def from_first_frame(self) -> "SavedTracks":
+        """Return the same tracks at the times since the first frame of the video, seconds.
+
+        Times of other programs and of older files may be those in the container, or of a clock. If
+        the first frame is not in the file, its time follows from the rate of the others.
+        """
+        indices = sorted(self.times)[:2]
+        if not indices:
+            return self
+        first, second = indices[0], indices[-1]
+        origin, rate = self.times[first], self.video and self.video.rate
+        if first:
+            step = (self.times[second] - origin) / max(1, second - first)
+            before = first / rate if rate else first * step
+            origin -= before
+            if origin <= max(1.0, _VARIES * before):
+                return self
+        if not origin:
+            return self
+        times = {index: round(time - origin, 6) for index, time in self.times.items()}
+        begin = self.begin and self.begin + timedelta(seconds=origin)
+        return replace(self, times=times, begin=begin)
 
     def of_video(self, video: SourceVideo) -> "SavedTracks":
         """Return the same tracks with what the file says of their video."""

@@ -51,7 +51,7 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
             for label in saved.labels
             if not (label.ignored or label.track.class_name in regions)
         ]
-        saved = replace(saved, labels=checked_labels(path, vehicles))
+        saved = replace(saved, labels=checked_labels(path, vehicles)).from_first_frame()
     finally:
         if was_enabled:
             gc.enable()
@@ -83,7 +83,7 @@ def read_head(path: Path) -> SavedTracks:
     with suppress(TruthError):
         form = recognize(path, b"".join(lines))
         if form.read_head:
-            return form.read_head(path, b"".join(lines))
+            return form.read_head(path, b"".join(lines)).from_first_frame()
     return SavedTracks(())
 
 

@@ -45,7 +45,7 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
     Parameters
     ----------
     start, end
-        Times as in `Frame.time`, seconds. The copy begins at the last key frame at or before
+        Times in the file, seconds. The copy begins at the last key frame at or before
         `start`, and ends before the first one at or after `end`, or with it if frames before it
         need it.
 

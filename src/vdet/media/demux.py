@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
 
@@ -77,8 +78,13 @@ HDR_TRANSFERS = (16, 18)
 """PQ and HLG, in codes of ITU-T H.273."""
 _RATES = 1, 240
 """Usual frames per second; another number in a raw stream is the unit of its clock."""
-_EXPORTER = re.compile(r"Lav[fc]|HandBrake|Adobe|Blackmagic|DaVinci|VLC|vlc|iMovie|Final Cut")
-"""Start of the name of a program that encodes videos again, or copies them."""
+_EXPORTER = re.compile(
+    r"Lav[fc]|HandBrake|Adobe|Blackmagic|DaVinci|VLC|vlc|iMovie|Final Cut|GPAC|MP4Box|L-SMASH|Wowza"
+    r"|mkvmerge|libebml|Bento4|Shaka|ISO Media file produced by Google|\w*dash"
+)
+"""Start of the name of a program that encodes videos again, or copies them, and the brand of parts
+for streaming.
+"""
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
 
 
@@ -119,7 +125,7 @@ def describe(path: Path, demuxer: "Demuxer", first: av.VideoFrame) -> VideoInfo:
         color=ColorTags(1, 1, 1) if is_hdr else colors,
         coding=(not is_hdr and orientation == Orientation() and Coding.of(first)) or Coding(),
         has_audio=bool(container.streams.audio) and not is_pipe(path),
-        tags=_tags(stream),
+        tags=_tags(stream, start),
     )
 
 
@@ -136,17 +142,24 @@ def _metadata(stream: VideoStream) -> dict[str, str]:
     return {name.lower(): value for name, value in metadata}
 
 
-def _tags(stream: VideoStream) -> Tags:
-    """Return metadata of the recording; the names differ between containers."""
+def _tags(stream: VideoStream, start: Fraction) -> Tags:
+    """Return metadata of the recording; the names differ between containers.
+
+    `start` is the time of the first frame in the file, seconds.
+    """
     tags = _metadata(stream)
+    if stream.container.format.name == "dhav":  # times are those of the camera's clock since 1970
+        time = datetime.fromtimestamp(float(start), UTC).replace(tzinfo=None)
+        tags["creation_time"] = time.isoformat()
     location = tags.get("location") or tags.get("com.apple.quicktime.location.iso6709")
     recorded = tags.get("com.apple.quicktime.creationdate")  # with a zone, and kept by exports
-    encoder = tags.get("encoder", "")
+    keys = "encoder", "handler_name", "major_brand", "compatible_brands"
+    exporter = next(filter(_EXPORTER.match, (tags.get(key, "") for key in keys)), None)
     return Tags(
         creation_time=recorded or tags.get("creation_time"),
         location=location,
         title=tags.get("title"),
-        exporter=encoder if _EXPORTER.match(encoder) and not recorded else None,
+        exporter=None if recorded else exporter,
     )
 
 

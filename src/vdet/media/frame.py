@@ -328,8 +328,8 @@ UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 class Frame:
     """One frame of a video.
 
-    `index` counts all frames of the file from 0. `time` is the exact presentation time in the file,
-    seconds (the first frame need not be at 0).
+    `index` counts all frames of the file from 0. `time` is the exact presentation time, seconds
+    from the first frame of the file.
     """
 
     index: int
@@ -370,7 +370,7 @@ class VideoInfo:
 
     `width` and `height` are of the upright picture in pixels. `rate` is the average in frames per
     second (25 where the file gives none), `time_base` the unit of the file's times in seconds,
-    `start` the time of the first frame. `frames` and `duration` (seconds) are what the file
+    `start` the time of the first frame in the file. `frames` and `duration` (seconds) are what it
     declares, or an estimate: not exact, None where unknown. `orientation` says how the coded
     picture was turned to stand upright. `pixel_aspect` is the width of an upright pixel over its
     height. `color` is of the images: where the file is HDR (PQ or HLG), they are BT.709.

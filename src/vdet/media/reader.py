@@ -32,8 +32,8 @@ _TOLERANCE = Fraction(1, 100)  # fraction of its duration that an intact file ma
 class VideoReader:
     """The frames of a video file, in order; a context manager. They can be read once.
 
-    It yields the frames with ``start <= time - info.start < end``, at most `frames` of them.
-    Seconds count from the first frame of the file, as in a player. Decoding begins at the key frame
+    It yields the frames with ``start <= time < end``, at most `frames` of them. Seconds count from
+    the first frame of the file, as in a player. Decoding begins at the key frame
     before `start` if the frames before it can be counted (see `Decoder`). Otherwise all frames are
     decoded, and those before `start` are dropped; the result is the same.
 
@@ -182,7 +182,7 @@ class VideoReader:
             if self._end is not None and since >= self._end:
                 return
             if since >= self._start:
-                yield Frame(index, time, self._upright(picture))
+                yield Frame(index, since, self._upright(picture))
         shown = max(period, picture.duration * info.time_base)
         declared, self.length = self.length, since + shown
         if declared and declared - self.length > max(2 * period, declared * _TOLERANCE):

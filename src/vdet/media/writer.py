@@ -246,7 +246,8 @@ class VideoWriter:
             if self._origin is None:
                 self._origin = frame.time
                 if self._info.has_audio:
-                    self._audio = AudioCopy(self._info.path, self._container, frame.time)
+                    begin = self._info.start + frame.time
+                    self._audio = AudioCopy(self._info.path, self._container, begin)
             since = frame.time - self._origin
             last, self._last = self._last, max(self._last + 1, round(since / self._time_base))
             self._check_pause((self._last - last) * self._time_base)

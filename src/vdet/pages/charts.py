@@ -8,9 +8,9 @@ import heapq
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from time import gmtime, strftime
+from datetime import datetime, timedelta
 
 from vdet.draw.boxes import Color
 from vdet.errors import clock_text
@@ -19,6 +19,11 @@ _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b
 _TICKS = 5  # maximum number of intervals on an axis
 _TIMES = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
 _NOTHING = 1e-9  # length of an axis whose ends are equal
+_CHANGE = 1800  # seconds; clocks are changed by a multiple
+_DAY, _ROUND = 86_400, datetime(1970, 1, 1)
+
+ToClock = Callable[[float], datetime] | None
+"""Converts seconds to clock times; None: they are those in the video."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,23 +84,31 @@ def hex_color(bgr: Color) -> str:
     return "#{:02x}{:02x}{:02x}".format(*bgr[::-1])
 
 
-def time_text(seconds: float, zero: float | None = None) -> str:
-    """Write a time in the video as `m:ss` or `h:mm:ss`, with tenths if it is not a whole second.
+def time_text(seconds: float, to_clock: ToClock = None) -> str:
+    """Write a time as `m:ss` or `h:mm:ss`, with tenths if it is not a whole second.
 
-    With `zero`, the second of the day at time 0, it is the time of day.
+    With `to_clock`, it is the time of day.
     """
-    if zero is None:
+    if to_clock is None:
         return clock_text(seconds, 1).removesuffix(".0")
-    return strftime("%H:%M:%S", gmtime(round(seconds + zero))).removesuffix(":00")
+    return f"{to_clock(seconds) + timedelta(seconds=0.5):%H:%M:%S}".removesuffix(":00")
 
 
-def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
-    """Return an axis of times in seconds; `zero` as for `time_text`."""
-    length, since = max(end - start, _NOTHING), zero or 0.0
-    step = next((step for step in _TIMES if length / step <= _TICKS), length / _TICKS)
-    numbers = range(math.ceil((start + since) / step), math.floor((end + since) / step) + 1)
-    times = [number * step - since for number in numbers]
-    return Axis(start, end, [(time, time_text(time, zero)) for time in times])
+def time_axis(start: float, end: float, to_clock: ToClock = None) -> Axis:
+    """Return an axis of times in seconds; `to_clock` as for `time_text`."""
+    length = max(end - start, _NOTHING)
+    days = _DAY * math.ceil(length / _TICKS / _DAY)
+    step = next((step for step in _TIMES if length / step <= _TICKS), days)
+
+    def since(time: float) -> float:
+        """Return the seconds from a round time, by the clock."""
+        return (to_clock(time).replace(tzinfo=None) - _ROUND).total_seconds() if to_clock else time
+
+    fine = min(step, _CHANGE)
+    first = start + -since(start) % fine
+    times = [first + number * fine for number in range(math.floor((end - first) / fine) + 1)]
+    ticks = [time for time in times if round(since(time) % step, 3) in (0, step)]
+    return Axis(start, end, [(time, time_text(time, to_clock)) for time in ticks])
 
 
 def number_axis(high: int) -> Axis:
@@ -111,12 +124,12 @@ def interval_plot(
     x: Axis,
     interval: int,
     title: str,
-    zero: float | None = None,
+    to_clock: ToClock = None,
 ) -> Plot:
     """Return a plot with a bar for each interval with events, stacked by series, and a legend.
 
     A series has the number of events in each interval, by its start in seconds. `interval` is in
-    seconds, `zero` as for `time_text`.
+    seconds, `to_clock` as for `time_text`.
     """
     bars, highest = list[Bar](), 1
     colors = dict(zip(series, itertools.cycle(_COLORS), strict=False))
@@ -124,7 +137,7 @@ def interval_plot(
         left, right, below = at + 0.1 * interval, at + 0.9 * interval, 0
         for name, counts in series.items():
             if count := counts[at]:
-                tip = f"{time_text(at, zero)}: {count} {name}"
+                tip = f"{time_text(at, to_clock)}: {count} {name}"
                 bars.append(Bar(left, right, below, below + count, colors[name], tip))
                 below += count
         highest = max(highest, below)

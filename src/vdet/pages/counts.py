@@ -1,7 +1,6 @@
 """The page of `vdet count`: all files of a camera, such as those of a day."""
 
 from collections import Counter
-from datetime import datetime
 from itertools import product
 
 from vdet.boxes import Image
@@ -47,11 +46,9 @@ def _plot(survey: Survey, length: int) -> Plot | None:
     series = {": ".join(key): Counter[float]() for key in directions if key[0] in names}
     for key, period in product(directions, periods):
         if key[0] in names and (count := tally.numbers[period.number, key, None]):
-            series[": ".join(key)][period.number - first.number] = count
+            series[": ".join(key)][period.number] = count
     if not any(series.values()):
         return None
-    zero = None
-    if isinstance(first.start, datetime):
-        zero = 3600.0 * first.start.hour + 60 * first.start.minute + first.start.second
-    x = time_axis(0, last.number + length - first.number, zero)
-    return interval_plot(series, x, length, "Vehicles by interval", zero)
+    to_clock = tally.intervals.to_clock
+    x = time_axis(first.number, last.number + length, to_clock)
+    return interval_plot(series, x, length, "Vehicles by interval", to_clock)

@@ -118,7 +118,6 @@ class Review:
         return {
             "video": video.name,
             "size": [video.width, video.height],
-            "start": float(video.start),
             "key": self.key,
             "lines": lines,
             "zones": zones,

@@ -188,18 +188,19 @@ def scene_picture(
 
 def page_table(table: SheetTable) -> Table:
     """Return a table as text, without the classes that no vehicle has."""
-    rows = [list(map(_cell_text, row)) for row in table.rows]
+    offset = table.clock_offset
+    rows = [[_cell_text(cell, offset) for cell in row] for row in table.rows]
     shown = [n for n, cells in enumerate(zip(*rows, strict=True)) if n < 3 or {*cells} - {"", "0"}]
     headings = [table.headings[n] for n in shown] if table.headings else []
     return headings, [[row[n] for n in shown] for row in rows]
 
 
-def _cell_text(cell: Cell) -> str:
+def _cell_text(cell: Cell, offset: str) -> str:
     match cell:
         case None:
             return ""
         case datetime():
-            return f"{cell:%Y-%m-%d %H:%M:%S}"
+            return f"{cell:%Y-%m-%d %H:%M:%S{offset}}"
         case timedelta():
             return clock_text(round(cell.total_seconds()), hours=True)
         case float():

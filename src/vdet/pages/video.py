@@ -14,7 +14,7 @@ from vdet.findings import Finding
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Row, VideoRows, table_json
-from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
+from vdet.pages.charts import Axis, Plot, TimelineBar, ToClock, hex_color, interval_plot
 from vdet.pages.render import jpeg_uri, render
 from vdet.pages.traffic import page_table, path_marks, scene_picture, with_marks
 from vdet.traffic.clock import Clock, Intervals, Span
@@ -165,7 +165,7 @@ class VideoPage:
         """Return the page; it loads only the video."""
         longest = sorted(self.records, key=lambda record: -record.seconds)[:_MAX_VEHICLES]
         shown = sorted(longest, key=lambda record: (record.first, record.id))
-        x = charts.time_axis(self.start, self.end, self.zero)
+        x = charts.time_axis(self.start, self.end, self.to_clock)
         ids = {record.id for record in shown}
         rows = self._rows({key: uri for key, (_, uri) in self.thumbnails.items() if key in ids})
         page, start = ("", self.player.start) if self.player else (None, 0.0)
@@ -206,9 +206,9 @@ class VideoPage:
         return self.end - self.start
 
     @property
-    def zero(self) -> float | None:
-        """The second of the day at time 0; None if unknown."""
-        return self.clock.second_of_day if self.clock else None
+    def to_clock(self) -> ToClock:
+        """Converts seconds in the video to clock times; None if these are unknown."""
+        return self.clock.at if self.clock else None
 
     def _figures(self) -> list[tuple[str, str]]:
         """Return the key figures."""
@@ -237,12 +237,12 @@ class VideoPage:
         seen = [(record.class_name or UNKNOWN, record.first) for record in self._moved]
         events = self.counts.events if self.counts else ()
         counted = [(f"{event.name}: {event.direction}", event.time) for event in events]
-        plots = []
+        plots, to_clock = [], self.to_clock
         for title, items in (("First seen", seen), ("At lines and zones", counted)):
             series: dict[str, Counter[float]] = {name: Counter() for name, _ in items}
             for name, time in items:
                 series[name][intervals.start_in(0, intervals.number(0, time))] += 1
-            plots += [interval_plot(series, x, self.interval, title, self.zero)] if series else []
+            plots += [interval_plot(series, x, self.interval, title, to_clock)] if series else []
         return plots
 
     def _traffic(self) -> Image | None:

@@ -239,8 +239,7 @@ class Results(Iterator[FrameResult]):
             self.reader, info = reader, reader.info
             if model:
                 results = self._searched(model, frames)
-                start, length = float(info.start), info.duration
-                clock = find_clock(run.source, settings, start, tags=info.tags, length=length)
+                clock = find_clock(run.source, settings, tags=info.tags, length=info.duration)
             elif tracks:
                 results = self._saved(tracks, frames)
             width, height = info.width, info.height

@@ -1,7 +1,7 @@
 """The clock of a video and its source, and the intervals of tables and pages."""
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 _log = logging.getLogger("vdet")
 _SAME = timedelta(minutes=1)
 """Maximum difference between the times in the name and the metadata without a warning."""
-_LATEST_START = 1e10
-"""Maximum time of the first frame, seconds: dates have no years before 1."""
 _CREATED = "its creation time"
-_EXPORTED = "its creation time, perhaps of an export"
+_EXPORTED, _FUTURE = f"{_CREATED}, perhaps of an export", f"{_CREATED}, in the future"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,38 +34,29 @@ class Clock:
     Attributes
     ----------
     zero
-        Clock time at time 0 of the video, in UTC.
+        Clock time of the first frame of the video, which is at time 0, in UTC.
     source
         Where it comes from, for messages.
     zone
         Time zone of the values of `at`; None: that of this computer.
-    first
-        Time of the first frame in the video, seconds.
     """
 
     zero: datetime
     source: str
     zone: tzinfo | None = None
-    first: float = 0.0
 
     def __str__(self) -> str:
-        return f"{_time_text(self.at(self.first))} ({self.source})"
+        return f"{_time_text(self.at(0.0))} ({self.source})"
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether it is only the creation time of a file that was written again."""
-        return self.source == _EXPORTED
-
-    @property
-    def second_of_day(self) -> float:
-        """The second of the day at time 0 in the video."""
-        zero = self.at(0.0).replace(tzinfo=None)
-        return (zero - zero.replace(hour=0, minute=0, second=0, microsecond=0)).total_seconds()
+        """Whether it is only the creation time of a file that was written again, or a wrong one."""
+        return self.source in (_EXPORTED, _FUTURE)
 
     @property
     def has_whole_seconds(self) -> bool:
         """Whether its fractions of a second are unknown."""
-        return self.at(self.first).microsecond == 0
+        return self.at(0.0).microsecond == 0
 
     def at(self, seconds: float) -> datetime:
         """Return the clock time of a time in the video, with the offset of the zone then."""
@@ -77,7 +66,6 @@ class Clock:
 def find_clock(
     path: Path,
     settings: Settings,
-    start: float,
     *,
     tags: Tags | None = None,
     length: Fraction | None = None,
@@ -88,14 +76,13 @@ def find_clock(
     `input.begin` has priority, then the pattern of `camera.clock`, then saved tracks, then a time
     in the name of the video or its first image, then the creation time of the video. A time without
     a zone is local time of the camera. There is a warning (logger "vdet") if the creation time is
-    more than a minute from the start and from the end by the name, or may be that of an export.
+    more than a minute from the start and from the end by the name, or may be that of an export. The
+    offset of a start time is that of the camera, unless it is that of this computer then.
 
     Parameters
     ----------
     path
         The video, or a file named after it.
-    start
-        Time of its first frame in the video, seconds.
     tags, length
         Its metadata, and its duration, seconds.
     saved
@@ -104,7 +91,7 @@ def find_clock(
     Raises
     ------
     ConfigError
-        The name does not match the pattern, or the first frame is centuries after time 0.
+        The name does not match the pattern.
     """
     clock = settings.camera.clock
     zone: tzinfo | None = clock.zone
@@ -112,18 +99,16 @@ def find_clock(
     is_named = clock.pattern and (zero is None or clock.time_in(path))
     if settings.input.begin:
         begin, source = parse_date_time(settings.input.begin), "as given"
-        zone = zone or begin.tzinfo
     elif saved and zero and not is_named:
-        begin, source = _utc(zero, zone) + timedelta(seconds=start), saved.begin_source
-        zone = zone or zero.tzinfo
+        begin, source = zero, saved.begin_source
     elif begin_and_source := _begin_by_name(path, settings, tags or Tags(), length):
         begin, source = begin_and_source
-        zone = zone or (begin.tzinfo if begin.utcoffset() else None)
+        begin = begin if begin.utcoffset() else _utc(begin, zone).astimezone()
     else:
         return None
-    if start > _LATEST_START:
-        raise ConfigError(f"{path}: its first frame is at {start:g} s; times must be in seconds")
-    found_clock = Clock(_utc(begin, zone) - timedelta(seconds=start), source, zone, start)
+    if not zone and begin.utcoffset() != begin.astimezone().utcoffset():
+        zone = begin.tzinfo
+    found_clock = Clock(_utc(begin, zone), source, zone)
     if found_clock.is_doubtful:
         _log.warning("%s: may not begin %s; input.begin overrides it", path, found_clock)
     return found_clock
@@ -146,7 +131,10 @@ def _begin_by_name(
     with suppress(ValueError):
         written = parse_date_time(tags.creation_time or "")
     if not named:
-        return (written, _EXPORTED if tags.exporter else _CREATED) if written else None
+        if not written:
+            return None
+        is_future = _utc(written, zone) > now() + _SAME
+        return written, _FUTURE if is_future else _EXPORTED if tags.exporter else _CREATED
     if written and not clock.pattern:
         later = _utc(written, zone) - _utc(named, zone)
         if min(abs(later), abs(later - timedelta(seconds=float(length or 0)))) > _SAME:
@@ -158,6 +146,11 @@ def _begin_by_name(
                 _time_text(_utc(written, zone).astimezone(zone)),
             )
     return named, "from its name"
+
+
+def now() -> datetime:
+    """Return the time, in UTC."""
+    return datetime.now(UTC)
 
 
 def _utc(time: datetime, zone: tzinfo | None) -> datetime:
@@ -175,7 +168,7 @@ Span = tuple[float, float]
 ClockTime = datetime | float | None
 """A clock time; without a clock, seconds in the video; None for several videos without one."""
 
-_GAP = 2.0
+GAP = 2.0
 """Maximum seconds between two times of one span, in `joined`."""
 _LONGEST_FRAME = 60.0
 """Maximum duration of a frame, seconds; a later next frame means a part without video."""
@@ -203,7 +196,7 @@ def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
     """Join ascending times that are close together into spans; omit spans that are too short."""
     spans: list[Span] = []
     for time in times:
-        extend(spans, time, _GAP)
+        extend(spans, time, GAP)
     return [(first, last) for first, last in spans if last - first >= shortest]
 
 
@@ -284,10 +277,7 @@ class Intervals:
         clocks = [clock for clock, _ in videos if clock]
         self._has_clock = 0 < len(clocks) == len(videos)
         if self._has_clock:
-            begins = [clock.at(clock.first) for clock in clocks]
-            is_local = all(time.utcoffset() == time.astimezone().utcoffset() for time in begins)
-            have_one_zone = all(clock.zone == clocks[0].zone for clock in clocks)
-            self._zone = None if is_local and not have_one_zone else clocks[0].zone
+            self._zone = clocks[0].zone
             self._zeros = [(clock.zero - _EPOCH).total_seconds() for clock in clocks]
         elif self._is_timed:
             self._zeros = [0.0]
@@ -387,8 +377,12 @@ class Intervals:
             is_part=observed < end - start - 1,
         )
 
+    @property
+    def to_clock(self) -> Callable[[float], datetime] | None:
+        """Converts seconds to clock times; None if these are unknown."""
+        return Clock(_EPOCH, "", self._zone).at if self._has_clock else None
+
     def _clock_time(self, seconds: float) -> ClockTime:
-        if self._has_clock:
-            time = _EPOCH + timedelta(milliseconds=round(1000 * seconds))
-            return time.astimezone(self._zone)
+        if to_clock := self.to_clock:
+            return to_clock(round(seconds, 3))
         return round(seconds, 3) if self._is_timed else None

@@ -183,7 +183,7 @@ class Corrections(Section):
     size: Size
     """Width and height of the frames that the points refer to."""
     start: float = 0.0
-    """Time at which minute 0 begins: that of the first frame, seconds in the video."""
+    """Of 1.1.0: the time of the first frame, seconds, which `read` takes off all times."""
     lines: tuple[LineSettings, ...] = ()
     zones: tuple[ZoneSettings, ...] = ()
     reviewer: str | None = None
@@ -211,6 +211,14 @@ class Corrections(Section):
         """Read a file. Raises `ConfigError`, with the position of each mistake."""
         document = read_document(path, limit=MAX_BYTES, what="file of corrections")
         corrections = validated(Corrections, document)
+        if start := corrections.start:
+            events = [e.model_copy(update={"time": e.time - start}) for e in corrections.events]
+            spans = [
+                span.model_copy(update={"start": span.start - start, "end": span.end - start})
+                for span in corrections.checked
+            ]
+            update = {"start": 0.0, "events": tuple(events), "checked": tuple(spans)}
+            corrections = corrections.model_copy(update=update)
         corrections._files = (str(path),)
         return corrections
 
@@ -282,7 +290,7 @@ class Corrections(Section):
 
     def minute(self, time: float) -> int:
         """Return the number of the minute of a time, seconds in the video."""
-        return int((time - self.start) // _MINUTE)
+        return int(time // _MINUTE)
 
     @property
     def checked_lines(self) -> set[str]:
@@ -420,7 +428,7 @@ def _minutes(counts: Counts, review: Corrections) -> list[int]:
 
 def _checked_minutes(counts: Counts, review: Corrections) -> list[int]:
     """Return the minutes that were checked at all lines which were checked at any time."""
-    lines, start = review.checked_lines, review.start + TOLERANCE
+    lines, start = review.checked_lines, TOLERANCE
     return [
         minute
         for minute in _minutes(counts, review)

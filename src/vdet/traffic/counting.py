@@ -97,7 +97,7 @@ def count_files(
             saved, rate_is_used = saved.at_rate(rate), True
         clock = clock_of_head
         if len(order) == 1:
-            clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
+            clock = find_clock(path, settings, saved=saved)
         if not (saved.video or settings.classes):
             saved = _without_people(path, saved, settings)
         names[str(path)] = saved.video.name if saved.video else None
@@ -236,8 +236,7 @@ class _Recording:
         own = self._settings.model_copy(update={"input": own_input})
         every = sorted(paths, key=natural_order)
         heads = {path: read_head(path) for path in every}
-        starts = {path: heads[path].times.get(0, 0.0) for path in every}
-        clocks = {path: find_clock(path, own, starts[path], saved=heads[path]) for path in every}
+        clocks = {path: find_clock(path, own, saved=heads[path]) for path in every}
         known = {
             path: clock
             for path, clock in clocks.items()
@@ -246,14 +245,11 @@ class _Recording:
         order = sorted(known, key=lambda path: known[path].at(heads[path].first_time))
         order += [path for path in every if path not in known]
         if begin:
-            given = find_clock(order[0], self._settings, starts[order[0]])
+            given = find_clock(order[0], self._settings)
             assert given
             self._is_chain = not known
             later = given.zero - known.get(order[0], given).zero
-            known = {
-                path: replace(given, zero=clock.zero + later, first=clock.first)
-                for path, clock in known.items()
-            }
+            known = {path: replace(given, zero=c.zero + later) for path, c in known.items()}
             known[order[0]] = given
         return [(path, known.get(path)) for path in order]
 
@@ -297,7 +293,7 @@ def _clock_after(before: _CountedVideo, video: _CountedVideo) -> Clock:
         raise TruthError(f"{video.name}: has no clock, and {fault}")
     assert before.clock
     zero = before.clock.at(before.end) - timedelta(seconds=video.first)
-    return replace(before.clock, zero=zero.astimezone(UTC), first=video.first)
+    return replace(before.clock, zero=zero.astimezone(UTC))
 
 
 class _Group:

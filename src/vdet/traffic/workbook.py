@@ -15,7 +15,7 @@ from vdet.files import valid_text
 from vdet.media.images import encode_image
 
 Cell = str | float | datetime | timedelta | None
-"""A clock time is written without its zone, and None as an empty cell."""
+"""A clock time shows its offset from UTC where that changes in a table. None is an empty cell."""
 
 _LAST_ROW = 1_048_575
 _A4 = 9
@@ -35,6 +35,12 @@ class SheetTable:
     headings: Sequence[str]
     rows: Sequence[Sequence[Cell]]
     title: str = ""
+
+    @property
+    def clock_offset(self) -> str:
+        """The format of the offset of clock times, if it changes in the table; else empty."""
+        times = (cell for row in self.rows for cell in row if isinstance(cell, datetime))
+        return " %z" if len({time.utcoffset() for time in times}) > 1 else ""
 
     def without_empty_columns(self) -> "SheetTable":
         """Return the table without the columns in which no row has a value."""
@@ -107,15 +113,16 @@ class _SheetWriter:
             self._page.write_string(self._row, column, valid_text(heading), self._style(**_HEADING))
             self._widen(column, max(map(len, heading.split()), default=0))
         self._row += bool(table.headings)
+        offset = table.clock_offset
         for row in table.rows:
             if self._row == _LAST_ROW:
                 self._cell(0, "more rows do not fit into a sheet; .csv has all")
                 break
             for column, cell in enumerate(row):
-                self._cell(column, cell)
+                self._cell(column, cell, offset)
             self._row += 1
 
-    def _cell(self, column: int, cell: Cell) -> None:
+    def _cell(self, column: int, cell: Cell, offset: str = "") -> None:
         at, left = (self._row, column), {"align": "left"}
         match cell:
             case str():
@@ -123,9 +130,10 @@ class _SheetWriter:
                 self._page.write_string(*at, valid_text(cell), self._style(text_wrap=wrap))
                 self._widen(column, len(cell))
             case datetime():
-                time, style = cell.replace(tzinfo=None), self._style(num_format=_CLOCK, **left)
+                form = f'{_CLOCK}"{cell:{offset}}"' if offset else _CLOCK
+                time, style = cell.replace(tzinfo=None), self._style(num_format=form, **left)
                 self._page.write_datetime(*at, time, style)
-                self._widen(column, len(_CLOCK))
+                self._widen(column, len(form))
             case timedelta():
                 self._page.write_datetime(*at, cell, self._style(num_format=_DURATION, **left))
             case int():

@@ -159,7 +159,7 @@ function labelOf(mark) {
 }
 
 /** Return the traces of the minute at which no vehicle was added. */
-const tracesInMinute = () => data.traces.map(trace => ({ ...trace, seconds: trace.time - data.start })).filter(trace =>
+const tracesInMinute = () => data.traces.map(trace => ({ ...trace, seconds: trace.time })).filter(trace =>
   minuteOf(trace) === minute && !state.missed.some(mark => mark.band === trace.band
     && Math.abs(mark.seconds - trace.seconds) < 1 && Math.abs(mark.position - trace.position) < 0.1));
 
@@ -308,7 +308,7 @@ function spans() {
 
 /** Return the line of the file for a mark, with all that is wrong of it. */
 function eventLine(mark) {
-  const time = Math.round(1000 * (mark.seconds + data.start)) / 1000, errors = Object.keys(mark.fixes);
+  const time = mark.seconds, errors = Object.keys(mark.fixes);
   const correct = errors.map(error => mark.fixes[error]).filter(value => value !== null);
   const parts = [`line: ${quoted(mark.line)}`, `time: ${time}`, `direction: ${quoted(mark.direction)}`, `class: ${quoted(mark.class)}`];
   const words = values => values.length > 1 ? `[${values.map(quoted).join(", ")}]` : quoted(values[0]);
@@ -328,13 +328,13 @@ function corrections() {
     `left: ${quoted(line.left)}, right: ${quoted(line.right)}}`);
   const zones = data.zones.map(zone => `  - {name: ${quoted(zone.name)}, points: [${zone.points.map(pair).join(", ")}]}`);
   const names = [...new Set(data.bands.map(band => band.name))];
-  const checked = names.flatMap(name => spans().map(([start, end]) => `  - {line: ${quoted(name)}, start: ${start + data.start}, end: ${end + data.start}}`));
+  const checked = names.flatMap(name => spans().map(([start, end]) => `  - {line: ${quoted(name)}, start: ${start}, end: ${end}}`));
   const isWrong = mark => Object.keys(mark.fixes).length > 0;
   const complete = spans().concat(allMarks().filter(isWrong).map(mark => [mark.seconds, mark.seconds]));
   const isListed = mark => isWrong(mark) || complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
   const events = allMarks().filter(isListed).sort((a, b) => a.seconds - b.seconds).map(eventLine);
   const sample = state.sample ? `{seed: ${state.sample.seed}, minutes: [${state.sample.minutes.join(", ")}]}` : "null";
-  return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, `start: ${data.start}`, ...list("lines", lines), ...list("zones", zones),
+  return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, ...list("lines", lines), ...list("zones", zones),
     `reviewer: ${state.reviewer ? quoted(state.reviewer) : "null"}`, `saved: ${now()}`, `sample: ${sample}`,
     ...list("checked", checked), ...list("events", events), ""].join("\n");
 }

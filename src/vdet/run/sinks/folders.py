@@ -52,8 +52,7 @@ class StagesSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Write the images if this is the frame."""
-        time = self.context.at + (self.context.video.start if self.context.video else 0)
-        if self._is_done or not result.searched or result.frame.time < time:
+        if self._is_done or not result.searched or result.frame.time < self.context.at:
             return
         self._is_done = True
         pictures = self.context.stage_images(result.frame.image, result.detections)
@@ -164,11 +163,11 @@ class PageSink(BaseSink):
             self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
-        settings, traffic, start = self.context.settings, self.traffic, float(self.video.start)
+        settings, traffic = self.context.settings, self.traffic
         return VideoPage(
             video=self.video,
             frames=self._frames,
-            spans=self._spans or [(start, start)],
+            spans=self._spans or [(0.0, 0.0)],
             records=traffic.vehicles,
             thumbnails=self._thumbnails,
             poster=self.context.poster.image(traffic.vehicles),
@@ -198,7 +197,7 @@ class PageSink(BaseSink):
         drawn = self._paths_of("video")
         if not drawn and (not source.is_file() or is_image_name(source)):
             return None
-        path, start = source, float(self.video.start)
+        path, start = source, 0.0
         if drawn:
             path, start = drawn[0], self._spans[0][0] if self._spans else start
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
@@ -300,14 +299,13 @@ class ClipSink(BaseSink):
         if self._copied_suffix:
             target = stem.with_name(stem.name + self._copied_suffix)
             try:
-                copy_part(video.path, start, end, target)
+                copy_part(video.path, video.start + start, video.start + end, target)
                 return target
             except OutputError as error:
                 target.unlink(missing_ok=True)
                 log.debug("%s; encoded instead", error)
         target = stem.with_name(f"{stem.name}.mp4")
-        part = max(start - video.start, Fraction(0)), end - video.start
-        encode_part(video.path, *part, target, self.context.settings)
+        encode_part(video.path, max(start, Fraction(0)), end, target, self.context.settings)
         return target
 
 

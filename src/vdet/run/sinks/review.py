@@ -99,7 +99,6 @@ class ReviewSink(BaseSink):
         self._pictures: list[StripPicture] = []
         self._minute = 0
         self._coding: Coding | None = None
-        self._start = float(self.video.start)
 
     def __exit__(self, kind: object, *_: object) -> None:
         with self._folder:
@@ -108,7 +107,7 @@ class ReviewSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Add a frame to all strips."""
-        seconds = max(0.0, float(result.frame.time) - self._start)
+        seconds = float(result.frame.time)
         if (minute := int(seconds // _MINUTE)) != self._minute:
             self._end_minute(is_end=False)
             self._minute = minute
@@ -223,7 +222,7 @@ class ReviewSink(BaseSink):
             ]
             spots += [_Spot(_SAME, band, 0.5) for band in bands]  # if there is no passage
             spot = min(spots, default=_Spot(0.0, None, 0.5))
-            seconds = round(event.time - self._start, 3)
+            seconds = round(event.time, 3)
             marks.append(EventMark(spot.band, seconds, round(spot.position, 3), event))
         return marks
 
