@@ -14,6 +14,8 @@ from conftest import Run
 from running import names, rows_of, write_drive
 from vdet.labels.reading import read_tracks
 from vdet.media.images import encode_image
+from vdet.run.loop import Pipeline
+from vdet.traffic import clock
 
 LINES = """
 camera: {size: [320, 240]}
@@ -203,6 +205,16 @@ def test_times_count_from_the_first_frame_in_any_container(
         found.append((tables, [Path(name).with_suffix("") for name in names(out)]))
     assert found[0] == found[1]
     assert "2026-05-01 07:00:0" in found[0][0]["c.csv"]
+
+
+def test_too_many_intervals_are_refused_before_the_video_is_searched(
+    run: Run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(clock, "_MAX_COUNT", 1)
+    monkeypatch.setattr(Pipeline, "complete", lambda *_: pytest.fail("frames are searched"))
+    wanted = ("--no-video", "--page", tmp_path / "page", "--interval", "1s")
+    result = run("detect-video", folder / "red.mp4", *wanted, code=1)
+    assert "traffic.interval: 1 s makes more than 1 intervals; use a longer one" in result.err
 
 
 def write_tracks(path: Path, *, shift: int = 0) -> Path:

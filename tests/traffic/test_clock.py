@@ -240,6 +240,13 @@ def test_the_key_of_apple_has_the_zone_and_is_not_of_an_export(tmp_path: Path) -
     assert str(clock) == "2026-05-01 07:00:00-03:00 (its creation time)"
 
 
+def test_a_time_zone_of_this_computer_that_is_missing_is_an_error() -> None:
+    os.environ["TZ"] = ":/nonexistent"
+    assert clock_of("20260501_070000.mp4", zone="Asia/Kolkata") is not None
+    with pytest.raises(ConfigError, match=r"TZ: /nonexistent not found; set TZ or camera\.clock"):
+        clock_of("20260501_070000.mp4")
+
+
 def write_dav(path: Path) -> Path:
     """Write a recording of a camera whose clock says 7:00."""
     with av.open(write_clip(path.with_suffix(".h264"))) as source:

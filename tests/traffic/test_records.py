@@ -40,13 +40,13 @@ def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
 
 
 def test_the_smallest_distance_and_the_usual_lane_are_kept() -> None:
-    places = [(30.0, -1), (24.5, 0), (25.0, 0), (None, None)]
+    places = [(30.0, -1), (0.0, 0), (25.0, 0), (None, None)]
     frames = (
         frame(n, track(1, PLACE, distance=metres, lane=lane))
         for n, (metres, lane) in enumerate(places)
     )
     found = record(*frames)
-    assert (found.distance, found.lane) == (24.5, 0)
+    assert (found.distance, found.lane) == (0.0, 0)
     unknown = record(frame(0, track(1, PLACE)))
     assert (unknown.distance, unknown.lane) == (None, None)
 

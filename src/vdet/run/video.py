@@ -28,7 +28,7 @@ from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.threads import read_async
 from vdet.track.track import FrameTracks
-from vdet.traffic.clock import Clock, find_clock
+from vdet.traffic.clock import Clock, check_intervals, find_clock
 from vdet.traffic.counts import Corrected, Counts
 from vdet.traffic.live import LiveTraffic
 from vdet.traffic.records import VehicleRecord
@@ -147,9 +147,7 @@ def saved_tracks(
         log.warning("%s: is of %s, not %s", tracks, saved.video.name, video.name)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    origin = float(video.start) if video else saved.first_time
-    start = origin + float(run.start or 0)
-    end = math.inf if run.end is None else origin + float(run.end)
+    start, end = float(run.start or 0), math.inf if run.end is None else float(run.end)
     regions = Regions(run.settings.regions, *size)
     frames = [
         replace(frame, tracks=regions.inside(frame.tracks))
@@ -357,6 +355,9 @@ def write_outputs(
     ):
         info, traffic, frames, ids = results.reader.info, results.traffic, 0, set[int]()
         assert traffic  # the video is open
+        if with_traffic and not run.is_part:
+            seconds = float(info.duration or 0)
+            check_intervals(run.settings.traffic.seconds, [(0.0, seconds)])
         context = SinkContext(
             files,
             run.settings,

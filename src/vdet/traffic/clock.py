@@ -1,6 +1,7 @@
 """The clock of a video and its source, and the intervals of tables and pages."""
 
 import logging
+import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -106,6 +107,9 @@ def find_clock(
         begin = begin if begin.utcoffset() else _utc(begin, zone).astimezone()
     else:
         return None
+    name = os.environ.get("TZ", "").removeprefix(":")
+    if not zone and name.startswith("/") and not Path(name).is_file():  # else it is UTC in silence
+        raise ConfigError(f"TZ: {name} not found; set TZ or camera.clock.zone")
     if not zone and begin.utcoffset() != begin.astimezone().utcoffset():
         zone = begin.tzinfo
     found_clock = Clock(_utc(begin, zone), source, zone)
@@ -216,6 +220,13 @@ _MAX_COUNT = 200_000
 """Maximum number of intervals: two days of seconds."""
 
 
+def check_intervals(length: int | None, spans: Iterable[Span]) -> None:
+    """Raise `ConfigError` if spans have too many intervals of a length, seconds."""
+    if length and sum((last - first) // length + 1 for first, last in spans) > _MAX_COUNT:
+        fault = f"{length} s makes more than {_MAX_COUNT:,} intervals"
+        raise ConfigError(f"traffic.interval: {fault}; use a longer one")
+
+
 @dataclass(frozen=True, slots=True)
 class Interval:
     """An interval of a table.
@@ -300,11 +311,7 @@ class Intervals:
             self._observed.append((first, last))
         self._first = min(first for first, _ in self._every)
         self._last = max(last for _, last in self._every)
-        if length and sum((last - first) // length + 1 for first, last in self._every) > _MAX_COUNT:
-            raise ConfigError(
-                f"traffic.interval: {length} s makes more than {_MAX_COUNT:,} intervals; use a "
-                "longer one"
-            )
+        check_intervals(length, self._every)
         numbers: set[int] = set()
         for first, last in self._every:
             number = self.number_at(first)

@@ -147,9 +147,10 @@ class TrackLinker:
             vehicle.add(key, track, foot, self._now, frame.index)
             if vehicle.returned is not None and vehicle.has_turned():
                 self.started += 1
-                self._vehicles[key] = vehicle.split(self.started)
+                self._vehicles[key] = second = vehicle.split(self.started)
                 paths.append(vehicle.path(self._now))
-            self._vehicles[key].classes[key] = track.class_name
+                vehicle = second
+            vehicle.classes[key] = track.class_name
         return paths
 
     def start_video(self) -> int:

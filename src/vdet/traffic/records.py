@@ -124,7 +124,8 @@ class VehicleRecord:
         self.class_name = track.class_name
         self.largest = max(self.largest, track.box, key=lambda box: box.area)
         if track.distance is not None:
-            self.distance = min(track.distance, self.distance or track.distance)
+            nearest = track.distance if self.distance is None else self.distance
+            self.distance = min(track.distance, nearest)
         if track.lane is not None:
             self.lanes[track.lane] += 1
         is_predicted = track.state == "predicted"
