@@ -4,6 +4,7 @@ Other packages register theirs as entry points of these groups. A package is imp
 of its names is used.
 """
 
+from functools import lru_cache
 from importlib.metadata import entry_points
 from pkgutil import resolve_name
 from typing import Any
@@ -64,6 +65,14 @@ def plugin_names(group: str) -> list[str]:
     """Return all names in a group, those of vdet first."""
     built_in = built_in_names(group)
     return built_in + sorted({point.name for point in entry_points(group=group)} - set(built_in))
+
+
+@lru_cache(maxsize=1)
+def plugin_packages() -> tuple[str, ...]:
+    """Return the names and versions of other packages on whose plug-ins results may depend."""
+    groups = DETECTORS, TRACKERS, STEPS, SINKS, FORMATS
+    packages = [point.dist for group in groups for point in entry_points(group=group)]
+    return tuple(sorted({f"{package.name} {package.version}" for package in packages if package}))
 
 
 def load_plugin(group: str, name: str) -> Any:

@@ -15,6 +15,7 @@ from running import names, write_drive
 from vdet.batch.task import process_file, result_digest
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
+from vdet.plugins import plugin_packages
 from vdet.run.sinks import Output
 from vdet.run.video import Run, write_outputs
 
@@ -87,6 +88,22 @@ def test_warnings_are_recorded(
     )
     assert logging.getLogger("vdet").handlers == before
     assert "frames damaged" not in capfd.readouterr().err
+
+
+def test_the_digest_changes_with_the_version_of_a_package_with_plugins(
+    job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    digests = [result_digest(job)]
+    for version in ("1.0", "1.1"):
+        info = tmp_path / version / "follows.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Name: follows\nVersion: {version}\n")
+        (info / "entry_points.txt").write_text("[vdet.steps]\nfollow = follows:step\n")
+        monkeypatch.syspath_prepend(info.parent)
+        plugin_packages.cache_clear()
+        digests.append(result_digest(job))
+    plugin_packages.cache_clear()
+    assert len(set(digests)) == 3
 
 
 def test_the_digest_changes_with_the_time_zone(job: Run, monkeypatch: pytest.MonkeyPatch) -> None:

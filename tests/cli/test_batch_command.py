@@ -83,6 +83,16 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert len(records_of(out)) == 4
 
 
+def test_with_strict_a_failed_file_decides_the_exit_code_before_a_doubtful_one(
+    run: Run, clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.batch.manifest.Record.is_doubtful", True)
+    arguments = ("detect-video", clips / "a.mp4", "--no-video", "--tracks", ".csv", "--strict")
+    assert run(*arguments, "-d", tmp_path / "doubtful").code == 4
+    (clips / "bad.mp4").write_bytes(b"no video")
+    assert run(*arguments, clips / "bad.mp4", "-d", tmp_path / "failed").code == 3
+
+
 def test_a_warning_is_printed_once_and_not_with_quiet(
     run: Run, clips: Path, tmp_path: Path
 ) -> None:

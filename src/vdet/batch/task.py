@@ -18,6 +18,7 @@ from vdet.detect.protocol import DetectorModel
 from vdet.errors import BatchError, in_one_line
 from vdet.files import OutputFiles, write_whole
 from vdet.media.images import numbered_images
+from vdet.plugins import plugin_packages
 from vdet.run.loop import Parts
 from vdet.run.sinks.protocol import output_state, sink_kind
 from vdet.run.video import Run, write_outputs
@@ -31,8 +32,9 @@ WrittenByPath = Mapping[str, Sequence[Written]]
 def result_digest(run: Run) -> str:
     """Return a digest of everything that the outputs of a run depend on.
 
-    This is the program, the model, the settings, the part, the time zone of this computer, and the
-    name, size and time of the input, of all numbered images, of the masks and of the picture.
+    This is the program, packages with plug-ins, the model, the settings, the part, the time zone of
+    this computer, and the name, size and time of the input, of all numbered images, of the masks
+    and of the picture.
     """
     settings = run.settings
     shown = (*(region.mask for region in settings.regions), settings.survey.picture)
@@ -40,6 +42,7 @@ def result_digest(run: Run) -> str:
     files = filter(Path.exists, (*(numbered_images(run.source) or [run.source]), *images))
     parts = (
         *(f"vdet {__version__}", run.start, run.end, run.frames, time.timezone, time.tzname),
+        *plugin_packages(),
         _sha256(model_file(settings.detector)),
         *((file.name, file.stat().st_size, file.stat().st_mtime_ns) for file in files),
         settings.with_paths(lambda _: "").model_dump_json(

@@ -112,7 +112,7 @@ def _moved_to_zero(
 
 
 def encode_part(
-    source: Path, start: Fraction, end: Fraction, target: Path, settings: Settings
+    source: Path, start: Fraction, end: Fraction, target: Path, settings: Settings, *, name: Path
 ) -> None:
     """Encode a part of a video, exact to the frame, with its audio.
 
@@ -120,13 +120,15 @@ def encode_part(
     ----------
     start, end
         Seconds from the first frame; frames with start ≤ time < end are written.
+    name
+        The name of the target in messages.
 
     Any damage is tolerated. Other errors as for `VideoReader` and `VideoWriter`.
     """
     tolerant = settings.input.model_copy(update={"max_damaged": 1.0})
     with (
         VideoReader(source, start=start, end=end, settings=tolerant) as reader,
-        VideoWriter(target, reader.info, settings.output, whole_audio=False) as writer,
+        VideoWriter(target, reader.info, settings.output, name=name, whole_audio=False) as writer,
     ):
         for frame in reader:
             writer.write(frame)

@@ -2,6 +2,7 @@
 
 import os
 import re
+import resource
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -201,6 +202,21 @@ def test_overwriting_removes_earlier_clips_of_vdet_and_nothing_else(
     assert len(names(tmp_path)) == len(before) + 2
     cut(source, tmp_path, shown=[])
     assert names(tmp_path) == before
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_a_full_disk_ends_the_run_and_names_the_clip(
+    source: Path, tmp_path: Path, exact: bool
+) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    words = rf"^{tmp_path}(/clip-00-00-00-car-1\+1.mp4)?: cannot be written: File too large$"
+    try:
+        with pytest.raises(OutputError, match=words):
+            cut(source, tmp_path, exact=exact)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert names(tmp_path) == []
 
 
 @pytest.mark.parametrize("is_link", [False, True])

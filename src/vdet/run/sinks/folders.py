@@ -305,7 +305,8 @@ class ClipSink(BaseSink):
                 target.unlink(missing_ok=True)
                 log.debug("%s; encoded instead", error)
         target = stem.with_name(f"{stem.name}.mp4")
-        encode_part(video.path, max(start, Fraction(0)), end, target, self.context.settings)
+        name, first = self.path / target.name, max(start, Fraction(0))
+        encode_part(video.path, first, end, target, self.context.settings, name=name)
         return target
 
 
