@@ -13,7 +13,6 @@ from docs.commands import PAGE
 
 from vdet.cli.main import cli
 from vdet.cli.options import SettingsSource
-from vdet.version import __version__
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -114,12 +113,6 @@ def test_packages_that_the_program_tells_to_install_are_those_of_the_project() -
     texts = "".join(map(text_of, [*PAGES, *(ROOT / "src").rglob("*.py")]))
     extras = re.findall(r"vdet\[([a-z]+)\]", texts)
     assert set(extras) <= set(project["optional-dependencies"])
-
-
-def test_the_version_is_that_of_the_last_release_in_the_changelog() -> None:
-    """`--skip-existing` makes the outputs of another version again."""
-    released = re.findall(r"^## (\S+) \(", text_of(ROOT / "CHANGELOG.md"), re.MULTILINE)
-    assert released[0] == __version__
 
 
 def test_the_page_of_commands_is_their_help() -> None:

@@ -15,7 +15,6 @@ import platform
 import re
 import shutil
 import signal
-import stat
 import sys
 import threading
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
@@ -91,7 +90,6 @@ class OutputFiles:
         self._inputs = inputs
         self._is_last = is_last
         self._claimed: set[Path] = set()
-        self._staged: set[Path] = set()  # single files, by their final names
         self._folders: dict[Path, Path] = {}  # temporary folders by destination
         self._is_earlier: dict[Path, Callable[[Path], bool]] = {}
         self._cleanup = contextlib.ExitStack()
@@ -148,9 +146,6 @@ class OutputFiles:
     def _check_replaceable(self, path: Path) -> None:
         if _id(path) in self._inputs:
             raise OutputError(f"{path}: is an input of this run; use another output")
-        is_earlier = self._is_earlier.get(path.parent)
-        if is_earlier and path not in self._staged and not is_earlier(path):
-            raise OutputError(f"{path}: was not written by vdet and will not be replaced")
         if not (path.is_file() or path.is_symlink()):
             raise OutputError(
                 f"{path}: is not a regular file and will not be replaced; use another output"
@@ -164,7 +159,6 @@ class OutputFiles:
         with output_errors(path):
             temporary = self._temporary_folder(path.parent) / path.name
             temporary.touch()
-        self._staged.add(path)
         return temporary
 
     def stage_folder(self, path: Path, is_earlier: Callable[[Path], bool] | None = None) -> Path:
@@ -173,9 +167,9 @@ class OutputFiles:
         Parameters
         ----------
         is_earlier
-            Whether an earlier run wrote a file. With `overwrite`, only such files are replaced, and
-            those that this run did not write are removed at the end. None: all are replaced, none
-            is removed.
+            Whether an earlier run wrote a file. With `overwrite`, the regular files in `path` for
+            which it is true, and which this run did not write, are removed at the end. None: keep
+            all.
         """
         if is_earlier:
             self._is_earlier[path] = is_earlier
@@ -205,15 +199,11 @@ class OutputFiles:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        files, older = {}, {}
         with contextlib.ExitStack() as end, self._cleanup:
-            try:
-                if kind is None:
-                    files = self._synced()
-                    older = self._kept_aside(files)
-            finally:
-                end.enter_context(_first_signal_waits(is_last=self._is_last))
             if kind is None:
+                files = self._synced()
+                older = self._kept_aside(files) if self._overwrite else {}
+                end.enter_context(_first_signal_waits(is_last=self._is_last))
                 _publish(self._folders, files, older)
 
     def _synced(self) -> dict[Path, Path]:
@@ -235,17 +225,18 @@ class OutputFiles:
         The new `files` get their permissions.
         """
         asides: dict[Path, Path] = {}
-        if not self._overwrite:
-            return asides
         replaced = [path for path in files if os.path.lexists(path)]
         for path in (*replaced, *self._left_over(files)):
             with output_errors(path):
                 self._check_replaceable(path)
                 if path in files and not path.is_symlink():
-                    files[path].chmod(stat.S_IMODE(path.stat().st_mode))
+                    shutil.copymode(path, files[path])
                 asides[path] = self._folders[path.parent] / _ASIDE / path.name
                 asides[path].parent.mkdir(exist_ok=True)
-                _copy_name(path, asides[path])
+                try:
+                    os.link(path, asides[path], follow_symlinks=False)
+                except OSError:  # a file system without hard links
+                    shutil.copy2(path, asides[path], follow_symlinks=False)
         return asides
 
     def _left_over(self, files: Container[Path]) -> list[Path]:
@@ -253,8 +244,7 @@ class OutputFiles:
         return [
             file
             for folder, is_earlier in self._is_earlier.items()
-            if folder.exists()
-            for file in folder.iterdir()
+            for file in folder.glob("*")  # it may not exist
             if file not in files and file.is_file() and not file.is_symlink()
             if _id(file) not in self._inputs and is_earlier(file)
         ]
@@ -266,27 +256,22 @@ def _first_signal_waits(*, is_last: bool) -> Iterator[None]:
 
     A second one acts at once. Only Python's handlers are delayed; they run in the main thread.
     """
-    handlers = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
-    if threading.current_thread() is not threading.main_thread():
-        handlers = {}
     waiting: list[int] = []
-
-    def restore() -> None:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+    handlers = contextlib.ExitStack()
 
     def wait(number: int, _: object) -> None:
-        restore()
         waiting.append(number)
+        handlers.close()
 
-    with contextlib.ExitStack() as stack:
-        stack.callback(restore)
-        for number, handler in handlers.items():
-            if callable(handler):
+    with handlers:
+        for number in ENDING_SIGNALS:
+            handler = signal.getsignal(number)
+            if callable(handler) and threading.current_thread() is threading.main_thread():
+                handlers.callback(signal.signal, number, handler)
                 signal.signal(number, wait)
         yield
         if is_last:
-            stack.pop_all()
+            handlers = handlers.pop_all()  # for `wait`
             return
     for came in waiting:
         signal.raise_signal(came)
@@ -298,36 +283,40 @@ def _publish(
     """Create folders, give new files their names, remove older ones; undo all if a step fails.
 
     `files` are new files, and `older` second names of older ones, by their final names. An
-    interrupt may come at any time, so the undo looks at what has been done.
+    interrupt may come at any time, so what undoes a step is prepared before it, and does nothing if
+    it was not done.
     """
-    new_folders: list[Path] = []  # outermost first
-    try:
+    with contextlib.ExitStack() as undo:
         for folder in folders:
+            for item in (*reversed(folder.parents), folder):
+                if not item.exists():
+                    undo.callback(_remove_empty, item)
             with output_errors(folder):
-                missing = [item for item in (folder, *folder.parents) if not item.exists()]
-                new_folders += reversed(missing)
                 folder.mkdir(parents=True, exist_ok=True)
         for path, file in files.items():
             with output_errors(path):
                 if path in older:
+                    undo.callback(older[path].replace, path)
                     file.replace(path)
                 else:
+                    undo.callback(_remove_name, path, file)
                     _add_name(path, file)
         for path in older.keys() - files.keys():
             with output_errors(path):
+                undo.callback(older[path].replace, path)
                 path.unlink()
-    except BaseException:
-        for path, file in files.items():
-            is_renamed = not file.exists()
-            if path not in older and (is_renamed or (path.exists() and path.samefile(file))):
-                path.unlink(missing_ok=True)
-        for path, aside in older.items():
-            if not files.get(path, path).exists():
-                aside.replace(path)
-        for folder in reversed(new_folders):
-            with contextlib.suppress(OSError):  # another run may have written into it
-                folder.rmdir()
-        raise
+        undo.pop_all()
+
+
+def _remove_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):  # another run may have written into it
+        folder.rmdir()
+
+
+def _remove_name(path: Path, file: Path) -> None:
+    """Undo `_add_name`, if it was done."""
+    if not file.exists() or (path.exists() and path.samefile(file)):
+        path.unlink(missing_ok=True)
 
 
 def _add_name(path: Path, file: Path) -> None:
@@ -341,14 +330,6 @@ def _add_name(path: Path, file: Path) -> None:
         if os.path.lexists(path):
             raise OutputError(f"{path}: appeared during the run; use another output") from None
         file.replace(path)  # a file system without hard links
-
-
-def _copy_name(path: Path, aside: Path) -> None:
-    """Give a file a second name; where there are no hard links, copy it."""
-    try:
-        os.link(path, aside, follow_symlinks=False)
-    except OSError:
-        shutil.copy2(path, aside, follow_symlinks=False)
 
 
 def _existing(path: Path) -> Path:

@@ -15,10 +15,11 @@ from conftest import Run
 from vdet.cli.messages import print_lines
 
 
-def test_the_version_is_in_the_changelog(run: Run) -> None:
+def test_the_version_is_that_of_the_last_release_in_the_changelog(run: Run) -> None:
+    """`--skip-existing` makes the outputs of another version again."""
     assert run("--version").out == f"vdet, version {vdet.__version__}\n"
-    changelog = Path(__file__).parents[2] / "CHANGELOG.md"
-    assert vdet.__version__ in re.findall(r"^## (\S+)", changelog.read_text("utf-8"), re.MULTILINE)
+    changelog = (Path(__file__).parents[2] / "CHANGELOG.md").read_text("utf-8")
+    assert vdet.__version__ == re.findall(r"^## (\S+) \(", changelog, re.MULTILINE)[0]
 
 
 def test_debug_shows_the_traceback(

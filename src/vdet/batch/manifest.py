@@ -2,8 +2,8 @@
 
 The worker writes the record of a file as a note into a hidden folder of the batch, just before the
 outputs are renamed. The note moves into the manifest when the file is done; if the batch is
-interrupted, when it ends, and if it is killed, when the next one begins. So a batch never has
-outputs without their record.
+interrupted, when it ends, and if it is killed, when the next one ends. So a batch never has outputs
+without their record.
 """
 
 import errno
@@ -149,9 +149,8 @@ def _notes(folder: Path) -> list[Path]:
 def open_manifest(folder: Path) -> Iterator[Callable[[ManifestRecord], None]]:
     """Yield a function that appends a record to the manifest and syncs it to disk.
 
-    The manifest is locked: no other batch can write into the folder until the block ends. Notes
-    left by an earlier batch are moved into it, and at the end those of files whose record was not
-    added, because the batch was interrupted.
+    The manifest is locked: no other batch can write into the folder until the block ends. At the
+    end, notes of an interrupted or earlier batch are moved into it.
 
     Raises
     ------
@@ -179,17 +178,13 @@ def open_manifest(folder: Path) -> Iterator[Callable[[ManifestRecord], None]]:
             if record.outputs:
                 note_path(folder, Path(record.outputs[0].path)).unlink(missing_ok=True)
 
-        def add_notes() -> None:
-            for record in read_records(*_notes(folder)):
-                add(record)
-
         if not _ends_with_whole_line(file):
             append("\n")  # a power cut or a full disk left half a line
-        add_notes()
         try:
             yield add
         finally:
-            add_notes()
+            for record in read_records(*_notes(folder)):
+                add(record)
             remove_stale(folder / _NOTES)
             with suppress(OSError):  # a worker of an earlier batch may still write into it
                 (folder / _NOTES).rmdir()

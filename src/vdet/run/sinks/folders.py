@@ -115,7 +115,7 @@ class CropSink(BaseSink):
 
 
 def _is_crop(path: Path) -> bool:
-    return _CROP_NAME.fullmatch(path.name) is not None and not path.is_symlink()
+    return _CROP_NAME.fullmatch(path.name) is not None
 
 
 def _crop_name(vehicle: VehicleRecord, time: float) -> str:
@@ -125,11 +125,7 @@ def _crop_name(vehicle: VehicleRecord, time: float) -> str:
 
 
 CROPS = SinkKind(
-    CropSink,
-    what="images of vehicles",
-    folder_pattern="vehicle-*-at-*s.*",
-    takes="videos",
-    may_replace=lambda path: not path.is_symlink(),
+    CropSink, what="images of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
 )
 
 
@@ -311,8 +307,11 @@ class ClipSink(BaseSink):
 
 
 def _is_clip(path: Path) -> bool:
-    is_named = _CLIP_NAME.fullmatch(path.name) is not None
-    return is_named and not path.is_symlink() and is_marked(path)
+    return _CLIP_NAME.fullmatch(path.name) is not None and is_marked(path)
+
+
+def _may_replace(path: Path) -> bool:
+    return _is_clip(path) or _CLIP_NAME.fullmatch(path.name) is None
 
 
 def _state(path: Path) -> tuple[int, int, int, int] | None:
@@ -325,9 +324,5 @@ def _state(path: Path) -> tuple[int, int, int, int] | None:
 
 
 CLIPS = SinkKind(
-    ClipSink,
-    what="clips",
-    folder_pattern="clip-*.*",
-    takes="videos",
-    may_replace=lambda path: _is_clip(path) or not _CLIP_NAME.fullmatch(path.name),
+    ClipSink, what="clips", folder_pattern="clip-*.*", takes="videos", may_replace=_may_replace
 )

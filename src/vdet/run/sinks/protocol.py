@@ -265,7 +265,7 @@ def check_sinks(
             path = next(iter(written), path / kind.folder_pattern)
         files.check(path, makes_folder=makes_folder or bool(kind.folder_pattern))
         for path in filter(os.path.lexists, written):
-            if not kind.may_replace(path):
+            if (kind.folder_pattern and path.is_symlink()) or not kind.may_replace(path):
                 advice = "was not written by vdet and will not be replaced; choose another name"
                 raise OutputError(f"{path}: {advice}")
 
