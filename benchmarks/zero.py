@@ -1,4 +1,4 @@
-"""Is a count of nothing doubted where vehicles move, and only there?
+"""Is a count of nothing doubted where vehicles move, and only there? Are jump cuts found?
 
     python -m benchmarks.zero           # drawn clips: 3 minutes
     python -m benchmarks.zero CLIPS     # and the videos of fixed cameras in a folder, in parts
@@ -7,11 +7,11 @@
 No vehicle is found in any clip. In 40 drawn ones there is none: people, trees, rain, snow, clouds,
 glare or insects move before a camera on a pole, or the camera drives on an empty road. In the
 others vehicles drive by day, in the dark and in fog. Last come clips in which nothing moves, or
-all vehicles have tracks.
+all vehicles have tracks. Of 100 more, half are put together of two.
 """
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -21,14 +21,15 @@ import numpy as np
 
 from benchmarks.conditions import CHANGES, SETTINGS
 from vdet.boxes import NO_BOXES, Image
+from vdet.conditions.cuts import with_cuts
 from vdet.conditions.watch import Conditions
 from vdet.config.schema import Settings
 from vdet.findings import Finding
-from vdet.media import Picture
+from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Scene, empty_road, pole_scene
+from vdet.synthetic.scene import Scene, demo_scene, empty_road, pole_scene
 from vdet.synthetic.truth import true_boxes
 from vdet.track.track import Track
 
@@ -237,6 +238,39 @@ def traffic(seed: int) -> Scene:
     return replace(scene, camera=PinholeCamera.pole(*SIZE), rate=Fraction(RATE), frames=RATE * 10)
 
 
+def shot(seed: int, frames: int) -> list[Image]:
+    """Return some frames, 25 a second: from a pole, or, at odd seeds, from a windscreen."""
+    scene = traffic(seed)
+    if seed % 2:
+        scene = replace(demo_scene(seed), camera=PinholeCamera.dashboard(*SIZE))
+    renderer = Renderer(replace(scene, rate=Fraction(25), frames=250))
+    first = int(np.random.default_rng(seed).integers(20, 100))
+    return [renderer.image(first + number) for number in range(frames)]
+
+
+def cut_of(seed: int) -> tuple[list[Image], int]:
+    """Return a clip put together of two, and the number of the first frame of the second."""
+    place = 15 + seed % 20
+    return [*shot(seed, place), *shot(seed + 101 + seed % 3, 12)], place
+
+
+def cuts_in(images: Iterable[Image]) -> list[int]:
+    """Return the numbers of the frames that begin a shot."""
+    frames = (Frame(n, Fraction(n, 25), Picture(image)) for n, image in enumerate(images))
+    return [index for index, cut in with_cuts((frame, frame.index) for frame in frames) if cut]
+
+
+def compare_cuts(first: int) -> None:
+    """Print how many of the cuts are found, and how many others."""
+    pairs = [cut_of(first + number) for number in range(50)]
+    found = sum(cuts_in(images) == [place] for images, place in pairs)
+    false = sum(bool(cuts_in(shot(first + number, 36))) for number in range(50))
+    print(f"cuts: {found} of {len(pairs)} found; {false} in 50 clips without", flush=True)
+    for path in sorted(Path(sys.argv[1]).glob("*.mp4")) if sys.argv[1:] else ():
+        with VideoReader(path) as reader:
+            print(f"cuts in {path.stem}: {cuts_in(frame.image for frame in reader)}", flush=True)
+
+
 def compare(name: str, clips: Sequence[Clip]) -> None:
     """Print how many clips have a warning, and which findings there are."""
     report(name, [clip.findings() for clip in clips])
@@ -270,6 +304,7 @@ def parts(path: Path, change: str) -> Iterator[tuple[Finding, ...]]:
 def main() -> None:
     """Print a row for each kind of clip."""
     first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    compare_cuts(first)
     for name, overlay in MOVING.items():
         seeds = range(first, first + 5)
         clips = [Clip(road(seed), overlay(np.random.default_rng(seed))) for seed in seeds]

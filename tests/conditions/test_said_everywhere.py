@@ -9,7 +9,7 @@ import numpy as np
 import openpyxl
 import pytest
 from benchmarks.conditions import CHANGES, SETTINGS
-from benchmarks.zero import RATE, SIZE, traffic
+from benchmarks.zero import RATE, SIZE, road, traffic
 
 from conftest import Run as Program
 from red_cars import NullDetector
@@ -26,6 +26,7 @@ from vdet.run.video import Run, run_video
 from vdet.synthetic.render import Renderer
 
 FRAMES = 6 * RATE
+OTHER = Renderer(road(3, speed=20.0)).image(0)
 WITHOUT_LINES = load_settings("svm")
 """The recall of this detector is not known, so poor visibility is a warning."""
 WITH_LINES = WITHOUT_LINES.model_copy(update={"traffic": SETTINGS.traffic})
@@ -37,6 +38,10 @@ def pan(image: Image, index: int) -> Image:
     return np.asarray(wide[:, 20 * index : 20 * index + SIZE[0]], np.uint8)
 
 
+def cut(image: Image, index: int) -> Image:
+    return OTHER if 2 * index >= FRAMES else image
+
+
 def changed(name: str) -> Change:
     return lambda image, _: CHANGES[name](image, np.random.default_rng(1), 0.0)
 
@@ -45,6 +50,7 @@ WAYS: dict[str, tuple[Change, str]] = {
     "pan": (pan, "the camera moves"),
     "dark": (changed("night"), "it is dark"),
     "haze": (changed("fog"), "contrast is low"),
+    "cut": (cut, "the video was cut at 0:03"),
     "water": (changed("drops"), "water or dirt on the lens"),
 }
 

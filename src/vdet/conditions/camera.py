@@ -79,6 +79,11 @@ class CameraWatch:
             self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
         return is_steady
 
+    def restart(self) -> None:
+        """Take the next plane for the view from now on."""
+        self._plane, self._points = None, np.empty((0, 1, 2), np.float32)
+        self._reference = np.zeros((4, 2))
+
     @property
     def is_still(self) -> bool:
         """Whether the camera was fixed most of the time."""

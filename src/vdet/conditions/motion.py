@@ -147,6 +147,11 @@ class MotionWatch:
             oldest = time - _FORGOTTEN
             self._starts = {key: seen for key, seen in self._starts.items() if seen[1] >= oldest}
 
+    def restart(self) -> None:
+        """Take the next plane for the background."""
+        self._end(self._movers)
+        self._movers, self._background = [], np.empty((0, 0), np.float32)
+
     @property
     def nothing_moved(self) -> bool:
         """Whether there was neither a track nor anything else that travelled, after `findings`."""

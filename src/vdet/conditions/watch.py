@@ -12,6 +12,7 @@ from vdet.conditions.motion import MotionWatch
 from vdet.conditions.weak import WeakWatch
 from vdet.config.schema import Settings
 from vdet.detect.onnx.water import is_wet
+from vdet.errors import clock_text
 from vdet.findings import Finding, Findings, at_places, without
 from vdet.media import Picture
 from vdet.track.track import Track
@@ -20,6 +21,8 @@ _STEP = 0.19
 """Minimum seconds between two planes; searches of an empty road are 0.2 to 0.25 seconds apart."""
 _WIDTH = 320
 """Width of a plane, pixels; motion is measured on planes of half this width."""
+_MOST = 3
+"""Maximum number of cuts that a finding names."""
 _NARROW = 320
 """Minimum width of the frames that the detectors were measured on, pixels."""
 
@@ -41,6 +44,13 @@ class Conditions:
         is_shipped = settings.detector.kind == "net" and settings.detector.model is None
         self._visibility = visibility.VisibilityWatch(is_shipped=is_shipped)
         self._time: float | None = None
+        self._cuts: list[float] = []
+
+    def cut(self, time: float) -> None:
+        """Begin anew with the next frame, before which there is a jump cut."""
+        self._cuts.append(time)
+        self._camera.restart()
+        self._motion.restart()
 
     def add(
         self, time: float, picture: Picture, detections: Boxes, tracks: Sequence[Track]
@@ -71,6 +81,11 @@ class Conditions:
         if self._width < _NARROW:
             text = f"frames are {self._width} pixels wide; detectors were measured on wider ones"
             findings.append(Finding("small-frames", text, severity="note"))
+        if self._cuts:
+            at = " and ".join(clock_text(int(time)) for time in self._cuts[:_MOST])
+            more = f" and {len(self._cuts) - _MOST} more times" if len(self._cuts) > _MOST else ""
+            text = f"the video was cut at {at}{more}: tracks end there; lines may match one part"
+            findings.append(Finding("cut", text, tuple((time, time) for time in self._cuts)))
         if self._time is not None:
             camera = self._camera.findings()
             has_places = settings.traffic or settings.regions or settings.camera.ground

@@ -24,7 +24,8 @@ from vdet.track.track import FrameTracks, Track
 
 _VARIES = 0.1
 """Maximum deviation of the mean frame rate at the start of a file from that after it."""
-
+_ROUNDING = 5e-4
+"""Maximum error of the times of findings, seconds."""
 NO_ID = -1
 """Id of a box without an id; in video, only ignore regions may have it."""
 
@@ -244,10 +245,14 @@ class SavedTracks:
         `STANDARD_CLASSES` if the label means one, else the label. An unknown time is NaN: see
         `has_times`.
         """
-        frames = self.by_frame()
+        frames, before = self.by_frame(), -math.inf
+        cuts = [first for item in self.findings if item.code == "cut" for first, _ in item.spans]
         for index in sorted(self._indices()):
             tracks = sorted((label.track for label in frames.get(index, ())), key=attrgetter("id"))
-            yield FrameTracks(index, self.times.get(index, math.nan), tuple(tracks))
+            time = self.times.get(index, math.nan)
+            is_cut = any(before < cut - _ROUNDING <= time for cut in cuts)
+            before = time
+            yield FrameTracks(index, time, tuple(tracks), is_cut=is_cut)
 
     def by_frame(self) -> dict[int, list[Label]]:
         """Return the labels by the number of their frame, ascending.

@@ -14,9 +14,11 @@ from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from vdet.boxes import NO_BOXES, Image
+from vdet.conditions.cuts import with_cuts
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
@@ -24,7 +26,7 @@ from vdet.media import Frame, VideoInfo
 from vdet.run.result import Facts, FrameResult
 from vdet.run.search import SearchedFrame, SearchRate, search_frames
 from vdet.run.steps import FindingStep, Step, StepContext, make_steps
-from vdet.track.factory import make_tracker, timed
+from vdet.track.factory import ShotTracker, make_tracker, timed
 from vdet.track.track import TimedTracker, VideoTracker
 
 FIRST_FRAMES = 2
@@ -73,19 +75,25 @@ class Pipeline:
         """
         search = search_frames(frames, self.detector, self.rate, steps=self.steps, threads=threads)
         with closing(search) as searched_frames:
-            observed = (self.observe(searched, source) for searched in searched_frames)
+            shots = with_cuts((searched.frame, searched) for searched in searched_frames)
+            observed = (self.observe(searched, source, is_cut=cut) for searched, cut in shots)
             for result in _delayed(observed, self.look_ahead):
                 yield self.complete(result)
 
-    def observe(self, searched: SearchedFrame, source: Path) -> FrameResult:
-        """Pass the next frame to the tracker; return its result, still without tracks."""
+    def observe(self, searched: SearchedFrame, source: Path, *, is_cut: bool) -> FrameResult:
+        """Pass the next frame to the tracker; return its result, still without tracks.
+
+        `is_cut` says whether a jump cut comes before it.
+        """
         frame, detections = searched.frame, searched.detections
+        if is_cut and isinstance(self.tracker, ShotTracker):
+            self.tracker.begin_shot(float(frame.time))
         if not searched.is_searched:
-            return FrameResult(source, frame, NO_BOXES, (), searched=False)
+            return FrameResult(source, frame, NO_BOXES, (), searched=False, is_cut=is_cut)
         if detections is None:
             detections = self.detector.detect(searched.candidates)
         self.tracker.observe(detections, float(frame.time), frame.picture)
-        return FrameResult(source, frame, detections, ())
+        return FrameResult(source, frame, detections, (), is_cut=is_cut)
 
     def complete(self, result: FrameResult) -> FrameResult:
         """Return the next result with its tracks, after all steps."""
@@ -142,10 +150,11 @@ def build(parts: Parts, settings: Settings, video: VideoInfo, images: Sequence[I
         The points or the lens in the settings do not fit the frames.
     """
     width, height = video.width, video.height
+    make = partial(make_tracker, settings, width, height)
     detector = parts.model.for_video(width, height, images)
     return Pipeline(
         detector,
-        timed(parts.tracker) if parts.tracker else make_tracker(settings, width, height),
+        timed(parts.tracker) if parts.tracker else ShotTracker(make),
         steps=[*make_steps(StepContext(settings, width, height, video)), *parts.steps],
         rate=SearchRate(settings.detector.searches_per_second, settings.detector.stride),
         look_ahead=Fraction(settings.tracker.look_ahead),

@@ -65,6 +65,8 @@ class FrameResult:
         search there are no detections.
     unselected
         The tracks of classes that are not selected; empty if all are.
+    is_cut
+        Whether a jump cut comes before it: the video was put together there.
     """
 
     source: Path
@@ -74,6 +76,7 @@ class FrameResult:
     facts: Facts = field(default_factory=dict)
     searched: bool = True
     unselected: tuple[Track, ...] = ()
+    is_cut: bool = False
 
     @property
     def road(self) -> "Road | None":
@@ -84,7 +87,8 @@ class FrameResult:
     def frame_tracks(self) -> FrameTracks:
         """The tracks with the number, time and facts of the frame."""
         facts = {name: fact.record() for name, fact in self.facts.items()}
-        return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)
+        index, time = self.frame.index, float(self.frame.time)
+        return FrameTracks(index, time, self.tracks, facts, self.is_cut)
 
     def __post_init__(self) -> None:
         if taken := _KEYS & self.facts.keys():

@@ -161,6 +161,8 @@ class ConditionStep:
 
     def apply(self, result: FrameResult) -> FrameResult:
         """Analyse a searched frame."""
+        if result.is_cut:
+            self._conditions.cut(float(result.frame.time))
         if result.searched:
             time, picture = float(result.frame.time), result.frame.picture
             self._conditions.add(time, picture, result.detections, result.tracks)

@@ -1,5 +1,7 @@
 """Trackers of any kind, made from settings."""
 
+from collections import deque
+from collections.abc import Callable
 from dataclasses import astuple, replace
 from math import inf
 
@@ -55,6 +57,8 @@ class InterpolatingTracker:
         """Return the vehicles shown at a time; as `TimedTracker.at`."""
         while len(self._searched) > 1 and self._searched[1][0] <= time:
             del self._searched[0]
+        if not self._searched:
+            return []
         begin, tracks = self._searched[0]
         if time <= begin:
             return tracks
@@ -62,6 +66,40 @@ class InterpolatingTracker:
         ends = {track.id: track for track in following}
         fraction = (time - begin) / (end - begin)
         return [_moved(track, ends[track.id], fraction) for track in tracks if track.id in ends]
+
+
+class ShotTracker:
+    """Shows the tracks of a new tracker after each jump cut; a `TimedTracker`. Ids go on.
+
+    Parameters
+    ----------
+    make
+        Makes a tracker.
+    """
+
+    def __init__(self, make: Callable[[], TimedTracker]) -> None:
+        self._make = make
+        self._shots = deque([(-inf, make())])
+        self._shift = self._largest = 0
+
+    def begin_shot(self, time: float) -> None:
+        """End all tracks before a frame, of which this is the time; none later was observed."""
+        self._shots.append((time, self._make()))
+
+    def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:
+        """Follow the vehicles into the next frame; as `TimedTracker.observe`."""
+        self._shots[-1][1].observe(detections, time, picture)
+
+    def at(self, time: float) -> list[Track]:
+        """Return the vehicles shown at a time; as `TimedTracker.at`."""
+        while len(self._shots) > 1 and self._shots[1][0] <= time:
+            self._shots.popleft()
+            self._shift = self._largest
+        tracks = self._shots[0][1].at(time)
+        if self._shift:
+            tracks = [replace(track, id=track.id + self._shift) for track in tracks]
+        self._largest = max([self._largest, *(track.id for track in tracks)])
+        return tracks
 
 
 def _moved(track: Track, end: Track, fraction: float) -> Track:

@@ -84,12 +84,15 @@ class FrameTracks:
         By id.
     facts
         More about the frame, as values for JSON: `lane` if lane finding is enabled.
+    is_cut
+        Whether a jump cut comes before it, so that no track goes on.
     """
 
     index: int
     time: float
     tracks: tuple[Track, ...]
     facts: Mapping[str, Any] = field(default_factory=dict)
+    is_cut: bool = False
 
     @property
     def boxes(self) -> Boxes:

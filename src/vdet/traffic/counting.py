@@ -329,7 +329,7 @@ class _Group:
             if frame.time >= video.start:
                 tracks = self._regions.inside(frame.tracks) if self._regions else frame.tracks
                 index, time = frame.index + video.frame_shift, frame.time + video.shift
-                self.counter.update(FrameTracks(index, time, tracks))
+                self.counter.update(replace(frame, index=index, time=time, tracks=tracks))
                 if video.meter:
                     video.meter.add(replace(frame, tracks=tracks))
         video.last = round(latest.time, 6) if latest else video.first

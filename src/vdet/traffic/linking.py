@@ -132,7 +132,7 @@ class TrackLinker:
     def add(self, frame: FrameTracks) -> list[VehiclePath]:
         """Add the next frame; return the paths that have ended."""
         self._now = round(frame.time, 6)  # as in files
-        oldest = self._now - _KEEP_SECONDS
+        oldest = self._now - (0 if frame.is_cut else _KEEP_SECONDS)
         ended = [key for key, vehicle in self._vehicles.items() if vehicle.last_seen < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         tracks = {track.id + self._id_shift: track for track in frame.tracks}
