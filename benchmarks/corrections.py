@@ -3,7 +3,8 @@
     python -m benchmarks.corrections
 
 Of the true tracks of the thirty scenes, 5 % are missing, 3 % are doubled, and 10 % have another
-class.
+class. The corrections are then applied to five kinds of other runs, of which each column says how
+many vehicles are wrong.
 """
 
 from collections import Counter
@@ -18,9 +19,11 @@ from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.corrections import Corrections, paired
+from vdet.traffic.correcting import apply_corrections
+from vdet.traffic.corrections import Corrections
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import Counts, Event
+from vdet.traffic.reviewed import ReviewedEvent, paired
 
 CLASSES = ("car", "truck", "bus", "motorcycle")
 MISSING, DOUBLED, RENAMED = 0.05, 0.03, 0.10
@@ -38,12 +41,12 @@ def classified(scene: PoleScene, seed: int) -> list[FrameTracks]:
     ]
 
 
-def damaged(video: Sequence[FrameTracks], seed: int) -> list[FrameTracks]:
+def damaged(video: Sequence[FrameTracks], seed: int, lost: float = MISSING) -> list[FrameTracks]:
     """Return tracks of which some are missing, doubled or of another class."""
     random = np.random.default_rng(seed)
     ids = sorted({track.id for frame in video for track in frame.tracks})
     missing, doubled, renamed = (
-        {number for number in ids if random.random() < part} for part in (MISSING, DOUBLED, RENAMED)
+        {number for number in ids if random.random() < part} for part in (lost, DOUBLED, RENAMED)
     )
 
     def shown(track: Track) -> Iterator[Track]:
@@ -84,9 +87,37 @@ def review(truth: Counts, counted: Counts, settings: Settings) -> Corrections:
     """Return the corrections of a reviewer who sees the truth at the lines."""
     traffic = settings.traffic.for_frames(WIDTH, HEIGHT)
     lines = [line.model_dump(exclude={"size"}) for line in traffic.lines]
-    events = [reviewed(*pair) for pair in paired(truth.events, counted.events)]
+    passed = [ReviewedEvent.model_validate(reviewed(event, None)) for event in truth.events]
+    true = dict(zip(map(id, passed), truth.events, strict=True))
+    events = [
+        reviewed(true[id(event)] if event else None, found)
+        for event, found in paired(passed, counted.events)
+    ]
+    first, last = truth.spans[0][0], truth.spans[-1][1]
+    checked = [
+        {"line": line["name"], "start": first, "end": last + 1, "complete": True} for line in lines
+    ]
     values = {"video": "in.mp4", "size": [WIDTH, HEIGHT], "lines": lines, "events": events}
-    return Corrections.model_validate(values)
+    return Corrections.model_validate({**values, "start": first, "end": last, "checked": checked})
+
+
+def other_runs(
+    video: Sequence[FrameTracks], counted: Counts, settings: Settings, seed: int
+) -> dict[str, Counts]:
+    """Return what other runs on a video count, by their kind."""
+    random = np.random.default_rng(seed)
+    size = (WIDTH, HEIGHT)
+    other = count_frames(damaged(video, seed + 1000), settings, size)
+    times = [max(0.0, event.time + random.uniform(-0.2, 0.2)) for event in other.events]
+    shifted = (replace(e, time=round(t, 3)) for e, t in zip(other.events, times, strict=True))
+    numbered = (replace(e, id=e.id + 500, vehicle=e.vehicle + 500) for e in counted.events)
+    return {
+        "other detector": replace(other, events=tuple(shifted)),
+        "other threshold": count_frames(damaged(video, seed, lost=0.4), settings, size),
+        "ids renumbered": replace(counted, events=tuple(numbered)),
+        "events deleted": replace(counted, events=counted.events[::2]),
+        "none found": replace(counted, events=()),
+    }
 
 
 def by_class(counts: Counts) -> Counter[tuple[str, str, str | None]]:
@@ -102,15 +133,20 @@ def differences(truth: Counts, counts: Counts) -> int:
 
 def main() -> None:
     """Measure all scenes; print a row for each."""
-    print("scene | vehicles at lines | corrections | wrong before | wrong after")
+    kinds = "other detector | other threshold | ids renumbered | events deleted | none found"
+    print(f"scene | vehicles at lines | corrections | wrong before | wrong after | {kinds}")
     for seed, scene in zip(count(1), pole_scenes(), strict=False):
         video = classified(scene, seed)
         truth = count_frames(video, scene.settings, (WIDTH, HEIGHT))
         counted = count_frames(damaged(video, seed), scene.settings, (WIDTH, HEIGHT))
-        after = review(truth, counted, scene.settings).apply(counted)
-        corrections = after.corrected.events if after.corrected else 0
-        before_and_after = [differences(truth, counts) for counts in (counted, after)]
-        print(scene.name, len(truth.events), corrections, *before_and_after, sep=" | ")
+        made = review(truth, counted, scene.settings)
+        after = apply_corrections({"": counted}, [made], scene.settings)[""]
+        corrections = len(after.corrected.corrections) if after.corrected else 0
+        wrong = [differences(truth, counts) for counts in (counted, after)]
+        for run in other_runs(video, counted, scene.settings, seed).values():
+            result = apply_corrections({"": run}, [made], scene.settings)[""]
+            wrong.append(differences(truth, result))
+        print(scene.name, len(truth.events), corrections, *wrong, sep=" | ")
 
 
 if __name__ == "__main__":

@@ -2,21 +2,22 @@
 
     python -m benchmarks.estimates
 
-In each of six situations, 1,000 samples are drawn, each of traffic and errors of its own. Errors
-come together in minutes (gamma-Poisson), as they do when something hides the road. A line of the
-table is one group: how many true vehicles there are, how often its interval holds them, the half of
-its mean width and its mean error as a fraction of them, and the mean number of further minutes for
-2 %. In the situation "classes", groups of vehicles that are wrongly named have lines of their own.
+In each of eight situations, 1,000 samples are drawn, each of traffic and errors of its own. Errors
+come together in minutes (gamma-Poisson), as they do when something hides the road; in the situation
+"bursts", half of the vehicles are missed in 3 % of the minutes. A line of the table is one group:
+how many true vehicles there are, how often its interval holds them, the half of its mean width and
+its mean error as a fraction of them, and the mean number of further spans for 2 %. Where there are
+several lines, or vehicles are wrongly named, the groups have lines of their own.
 """
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vdet.traffic.estimate import CountError, Estimate, estimate
-from vdet.traffic.sample import draw_minutes
+from vdet.traffic.estimate import ALL, CountError, Estimate, VehicleGroup, estimate
+from vdet.traffic.sample import draw_spans
 
 CLASSES = {"car": 0.85, "truck": 0.1, "bus": 0.05}
 
@@ -27,7 +28,9 @@ class Situation:
 
     `missed` and `false` are fractions of the vehicles that pass; false events also come without
     traffic, `ghosts` in a minute. `together` is the variance of the rates between minutes, relative
-    to their square. `renamed` has the fraction of each class that is named as another.
+    to their square. `renamed` has the fraction of each class that is named as another. `lines` have
+    the part of the traffic at each line, and how often more is missed there. In a fraction `bursts`
+    of the minutes, half of the vehicles are missed.
     """
 
     rates: tuple[float, ...]  # true vehicles a minute, of equal parts of the video
@@ -35,10 +38,11 @@ class Situation:
     false: float
     checked: int = 10
     minutes: int = 240
-    lines: int = 1
+    lines: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
     together: float = 0.5
     ghosts: float = 0.0
     grows: float = 0.0  # how much more is missed for each vehicle a minute, as a fraction
+    bursts: float = 0.0
     renamed: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -46,13 +50,25 @@ SITUATIONS = {
     "few errors": Situation((10,), missed=0.02, false=0.005),
     "many errors": Situation((10,), missed=0.15, false=0.08, together=1.0),
     "rush hour": Situation((4, 8, 30, 25, 6, 2), missed=0.02, false=0.01, grows=0.2, checked=20),
-    "two lines": Situation((6, 12), missed=0.05, false=0.02, lines=2, checked=20),
+    "two lines": Situation(
+        (6, 12), missed=0.05, false=0.02, lines=((1.0, 1.0), (1.0, 1.0)), checked=20
+    ),
     "classes": Situation(
         (12,), missed=0.03, false=0.01, checked=20, renamed={"truck": 0.3, "bus": 0.2, "car": 0.02}
     ),
     "empty minutes": Situation(
         (0.02, 0.02, 2, 0.02), missed=0.1, false=0.05, ghosts=0.02, checked=20
     ),
+    "a worse line": Situation(
+        (10,), missed=0.05, false=0.01, lines=((1.0, 1.0), (1.0, 3.0)), checked=20
+    ),
+    "a quiet line": Situation(
+        (10,), missed=0.05, false=0.01, lines=((1.0, 1.0), (1 / 60, 1.0)), checked=20
+    ),
+}
+BURSTS = {
+    f"bursts, {rate} a minute": Situation((rate,), missed=missed, false=0.005, bursts=0.03)
+    for rate, missed in ((10, 0.02), (30, 0.02))
 }
 
 
@@ -72,7 +88,7 @@ class Result:
         return (self.estimate.high - self.estimate.low) / 2
 
 
-def simulate(situation: Situation, seed: int) -> dict[str, Result]:
+def simulate(situation: Situation, seed: int) -> dict[VehicleGroup, Result]:
     """Return the results of one sample, by group."""
     rng = np.random.default_rng(seed)
     minutes, names = situation.minutes, list(CLASSES)
@@ -81,48 +97,64 @@ def simulate(situation: Situation, seed: int) -> dict[str, Result]:
     harder = 1 + situation.grows * (rates - rates.min())
     hidden, wrong = (rng.gamma(shape, 1 / shape, minutes) for _ in range(2))
     missing = np.minimum(0.9, situation.missed * harder * hidden)
-    counted = np.zeros((len(names), minutes), int)
-    true = np.zeros_like(counted)
+    missing = np.where(rng.random(minutes) < situation.bursts, 0.5, missing)
+    groups = [ALL, *(VehicleGroup(str(line), "in") for line in range(len(situation.lines)))]
+    groups += [VehicleGroup(class_name=name) for name in names]
+    counted, true = ({group: [0] * minutes for group in groups} for _ in range(2))
     errors: list[CountError] = []
+
+    def count(
+        table: dict[VehicleGroup, list[int]], minute: int, line: int, kind: int
+    ) -> tuple[VehicleGroup, ...]:
+        found = ALL, VehicleGroup(str(line), "in"), VehicleGroup(class_name=names[kind])
+        for group in found:
+            table[group][minute] += 1
+        return found
+
+    shares = list(CLASSES.values())
     for minute in range(minutes):
-        for _ in range(situation.lines):  # the same minutes are hard at both
-            false = rates[minute] * situation.false * wrong[minute] + situation.ghosts
-            for kind in rng.choice(3, rng.poisson(false), p=list(CLASSES.values())):
-                counted[kind, minute] += 1
-                errors.append(CountError(minute, names[kind], None))
-            for kind in rng.choice(3, rng.poisson(rates[minute]), p=list(CLASSES.values())):
-                true[kind, minute] += 1
-                name, shown = names[kind], kind
-                if rng.random() < missing[minute]:
-                    errors.append(CountError(minute, None, name))
+        for line, (part, worse) in enumerate(situation.lines):  # the same minutes are hard at all
+            traffic = part * rates[minute]
+            false = traffic * situation.false * wrong[minute] + situation.ghosts
+            for kind in rng.choice(3, rng.poisson(false), p=shares):
+                found = count(counted, minute, line, kind)
+                errors.append(CountError(minute, found, ()))
+            for kind in rng.choice(3, rng.poisson(traffic), p=shares):
+                right = count(true, minute, line, kind)
+                if rng.random() < worse * missing[minute]:
+                    errors.append(CountError(minute, (), right))
                     continue
-                if rng.random() < situation.renamed.get(name, 0):
-                    shown = (kind + 1) % 3
-                    errors.append(CountError(minute, names[shown], name))
-                counted[shown, minute] += 1
-    order = draw_minutes([int(number) for number in counted.sum(axis=0)], seed)
-    checked = set(order[: situation.checked])
-    table = {name: [int(n) for n in row] for name, row in zip(names, counted, strict=True)}
-    seen = [error for error in errors if error.minute in checked]
-    estimates = estimate(table, seen, checked, order)
-    totals = {None: true.sum()} | dict(zip(names, true.sum(axis=1), strict=True))
-    return {item.group or "all": Result(item, int(totals[item.group])) for item in estimates}
+                is_renamed = rng.random() < situation.renamed.get(names[kind], 0)
+                shown = count(counted, minute, line, (kind + 1) % 3 if is_renamed else kind)
+                if is_renamed:
+                    errors.append(CountError(minute, shown, right))
+    order = draw_spans(counted[ALL], seed)
+    estimates = estimate(counted, errors, order[: situation.checked], order)
+    return {item.group: Result(item, sum(true[item.group])) for item in estimates}
 
 
 def measure(situation: Situation, samples: int) -> dict[str, list[Result]]:
     """Return the results of many samples, by group."""
     by_sample = [simulate(situation, seed) for seed in range(samples)]
-    groups = by_sample[0] if situation.renamed else ["all"]
-    return {group: [results[group] for results in by_sample] for group in groups}
+    groups = {"all": ALL}
+    if len(situation.lines) > 1:
+        groups |= {f"line {n + 1}": VehicleGroup(str(n), "in") for n in range(len(situation.lines))}
+    if situation.renamed:
+        groups |= {name: VehicleGroup(class_name=name) for name in CLASSES}
+    return {name: [results[group] for results in by_sample] for name, group in groups.items()}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=int, default=1000)
     arguments = parser.parse_args()
+    situations = dict(SITUATIONS)
+    for name, situation in BURSTS.items():
+        for checked in (3, 6, 10, 20):
+            situations[f"{name}, {checked}"] = replace(situation, checked=checked)
     print("| situation | checked | true | held | ± half width | mean error | more for 2 % |")
     print("|---|---|---|---|---|---|---|")
-    for name, situation in SITUATIONS.items():
+    for name, situation in situations.items():
         for group, results in measure(situation, arguments.samples).items():
             true = np.mean([result.true for result in results])
             half = np.mean([result.half for result in results]) / true

@@ -46,6 +46,7 @@ from vdet.synthetic.scene import (
 from vdet.synthetic.truth import TrueBox, true_boxes
 from vdet.synthetic.vehicle import draw_vehicle
 from vdet.track.track import FrameTracks, Track
+from vdet.traffic.correcting import apply_corrections
 from vdet.traffic.corrections import Corrections
 from vdet.traffic.counts import Counts
 from vdet.traffic.live import LiveTraffic
@@ -317,7 +318,7 @@ def main() -> None:
             print(f"{kind}: {len(taken)} errors, {np.mean(taken):.2f} actions, most {max(taken)}")
         path = folder / "corrections.yaml"
         path.write_text(measured["corrections"], encoding="utf-8")
-        corrected = Corrections.read(path).apply(counts)
+        corrected = apply_corrections({"": counts}, [Corrections.read(path)], SETTINGS)[""]
         print(f"counts by class are exact: {by_class(corrected) == by_class(true)}")
 
 

@@ -38,7 +38,7 @@ from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.files import OutputFiles, valid_text
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks
+from vdet.labels.label import Label, SavedTracks, SourceVideo
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
@@ -52,7 +52,8 @@ from vdet.run.steps import Step
 from vdet.run.video import Results, Run, RunTotals, run_video
 from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
-from vdet.traffic.corrections import read_corrections
+from vdet.traffic.correcting import all_classes, apply_corrections
+from vdet.traffic.corrections import Corrections
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord
@@ -313,18 +314,24 @@ def count(
     corrections
         A file of corrections that a reviewer saved, or several, which are merged.
     """
-    reviews = read_corrections(map(Path, _listed(corrections)))
+    reviews = [Corrections.read(Path(path)) for path in _listed(corrections)]
+    key, counting = "", all_classes(settings, reviews)
     if isinstance(tracks, str | PathLike):
-        path = Path(tracks)
-        return count_files([path], settings, size, rate, corrections=reviews)[str(path)]
-    frames = iter(tracks)
-    first = next(frames, None)
-    if isinstance(first, FrameResult):
-        size = size or (first.frame.picture.width, first.frame.picture.height)
-    items = frames if first is None else chain([first], frames)
-    shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in items)
-    name = valid_text(first.source.name) if isinstance(first, FrameResult) else None
-    return count_frames(shown, settings, size, corrections=reviews, name=name)
+        key = str(Path(tracks))
+        counted = count_files([Path(tracks)], counting, size, rate)
+    else:
+        frames = iter(tracks)
+        first = next(frames, None)
+        if isinstance(first, FrameResult):
+            size = size or (first.frame.picture.width, first.frame.picture.height)
+        items = frames if first is None else chain([first], frames)
+        shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in items)
+        counts = count_frames(shown, counting, size)
+        if isinstance(first, FrameResult) and size:
+            source = SourceVideo(valid_text(first.source.as_posix()), *size)
+            counts = replace(counts, source=source)
+        counted = {key: counts}
+    return apply_corrections(counted, reviews, settings)[key]
 
 
 def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = None) -> Scores:

@@ -8,7 +8,7 @@ import pydantic
 from pydantic import AliasChoices, Field
 
 Severity = Literal["warning", "note", "fact"]
-AT_LINES = "frame-rate", "ground", "line", "traces"
+AT_LINES = "corrections", "frame-rate", "ground", "line", "traces"
 """Codes of findings about counts and speeds, which other lines may not have."""
 
 

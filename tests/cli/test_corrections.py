@@ -86,21 +86,36 @@ def test_several_videos_have_corrections_of_their_own(run: Run, folder: Path) ->
         ]
         path.write_text("\n".join(map(json.dumps, [{"video": video, **frames[0]}, *frames[1:]])))
     review, totals = folder / "b.yaml", folder / "totals.json"
-    review.write_text(HEAD.replace("red.mp4", "b.mp4") + MISSED)
+    by_whom = "reviewer: Ann\nsaved: 2026-05-01 10:00:00Z\n"
+    review.write_text(by_whom + HEAD.replace("red.mp4", "b.mp4") + MISSED)
     count = ("count", *paths, "-c", folder / "lines.yaml", "--corrections", review)
     result = run(*count, "--counts", totals, code=0)
     assert result.out.endswith(
-        f"{paths[1]}: corrected: 1 event, by b.yaml; 1 of 1 minute checked\n"
+        f"{paths[1]}: corrected: 1 event, by b.yaml; minutes checked: 0.03 of 0.03; at checked "
+        "lines 1 counted, 2 corrected, 2 estimated (95 %: 2 to 2)\n"
     )
     videos = json.loads(totals.read_text())["videos"]
     assert [video.get("corrected") for video in videos.values()] == [
         None,
         {
-            "events": 1, "files": ["b.yaml"], "checked": 1, "minutes": 1,
+            "events": 1, "files": ["b.yaml"], "names": ["gate"], "checked": [[0.0, 1.96]],
+            "corrections": [
+                {
+                    "counted": None,
+                    "right": {"time": 0.1, "name": "gate", "direction": "in", "class": "truck"},
+                    "reviewer": "Ann", "saved": "2026-05-01 10:00:00.000+00:00",
+                },
+            ],
             "estimates": [
-                {"group": None, "counted": 1, "true": 2, "low": 2, "high": 2, "more": 0},
-                {"group": "truck", "counted": 0, "true": 1, "low": 1, "high": 1, "more": 0},
-                {"group": "vehicle", "counted": 1, "true": 1, "low": 1, "high": 1, "more": 0},
+                {"name": name, "direction": direction, "class": kind, "counted": counted,
+                 "corrected": true, "estimated": true, "low": true, "high": true, "more": 0}
+                for name, direction, kind, counted, true in (
+                    (None, None, None, 1, 2),
+                    ("gate", "out", None, 1, 1),
+                    ("gate", "in", None, 0, 1),
+                    (None, None, "vehicle", 1, 1),
+                    (None, None, "truck", 0, 1),
+                )
             ],
         },
     ]  # fmt: skip
@@ -123,7 +138,7 @@ def test_a_run_corrects_its_counts_records_and_page(
     outputs = {"counts": "c.csv", "flows": "f.json", "vehicles": "v.json", "page": "page"}
     options = [part for name, path in outputs.items() for part in (f"--{name}", folder / path)]
     result = run(*detect, *options, "--corrections", review, code=0)
-    assert f"{clip}: corrected: 2 events, by c.yaml" in result.err
+    assert f"{clip}: corrected: 4 events, by c.yaml" in result.err
     rows = rows_of(folder / "c.csv")
     assert [(row["name"], row["class"]) for row in rows] == [
         ("gate", "truck"), ("gate", "bus"), ("yard", "bus"), ("yard", "bus"),
@@ -134,7 +149,7 @@ def test_a_run_corrects_its_counts_records_and_page(
     [record] = json.loads((folder / "v.json").read_text())
     assert (record["class"], record["corrected"]) == ("bus", ["c.yaml"])
     page = (folder / "page" / "page.html").read_text()
-    assert "These counts are corrected: 2 events, by c.yaml; 1 of 1 minute checked." in page
+    assert "These counts are corrected: 4 events, by c.yaml; minutes checked: 0.04 of 0.04;" in page
     review.write_text(HEAD.replace("red.mp4", "other.mp4") + MISSED)
     result = run(*detect, "--counts", folder / "d.csv", "--corrections", review, code=1)
     assert "c.yaml: corrects other.mp4" in result.err

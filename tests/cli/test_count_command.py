@@ -108,7 +108,7 @@ def test_tracks_of_a_video_whose_name_is_not_utf8_can_be_counted(
     run("detect-video", clip, "--no-video", "--tracks", tracks, *red, code=0)
     video = read_tracks(tracks).video
     assert video
-    assert video.name == r"caf\udce9.mp4"
+    assert video.name.endswith(r"/caf\udce9.mp4")
     fixes.write_text("{video: 'caf\\udce9.mp4', size: [320, 240]}")
     run("count", tracks, "--corrections", fixes, *lines, code=0)
     wanted = ("--no-video", "--counts", tmp_path / "c.json", "--corrections", fixes)

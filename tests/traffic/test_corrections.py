@@ -1,6 +1,7 @@
 """Corrections of counts: their files, what follows from them, and what does not fit."""
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +22,12 @@ from traffic.scenes import (
     through,
 )
 from vdet.errors import ConfigError
-from vdet.traffic.corrections import (
-    Corrections,
-    apply_corrections,
-    by_video,
-    read_corrections,
-)
+from vdet.labels.label import SourceVideo
+from vdet.traffic.correcting import apply_corrections
+from vdet.traffic.corrections import Corrections, by_video
 from vdet.traffic.counting import count_frames
-from vdet.traffic.counts import Corrected, Counts, Event
-from vdet.traffic.estimate import CountError, estimate
+from vdet.traffic.counts import Counts, Event
+from vdet.traffic.estimate import ALL, CountError, VehicleGroup, estimate
 
 SECOND = LINE.model_copy(update={"name": "second", "start": (200, 300), "end": (1000, 300)})
 SIZE = WIDTH, HEIGHT
@@ -75,6 +73,14 @@ def missed(time: float, class_name: str = "bus") -> dict[str, Any]:
     return where | {"class": class_name, "error": "missed"}
 
 
+def corrected(counted: Counts, *paths: Path, classes: tuple[str, ...] = ()) -> Counts:
+    """Apply files of corrections to the counts of a video."""
+    traffic = SETTINGS.traffic.for_frames(*SIZE)
+    settings = SETTINGS.model_copy(update={"classes": classes, "traffic": traffic})
+    reviews = [Corrections.read(path) for path in paths]
+    return apply_corrections({"": counted}, reviews, settings)[""]
+
+
 def events_of(counted: Counts, name: str) -> list[Event]:
     return [event for event in counted.events if event.name == name]
 
@@ -93,34 +99,33 @@ def test_events_are_removed_added_renamed_and_turned(tmp_path: Path) -> None:
         missed(8.5),
         error(last, "false"),
     )
-    after = Corrections.read(path).apply(before)
+    after = corrected(before, path)
     assert [one[1:] for one in ways(after) if one[0] == "line"] == [
         ("here", "truck"), ("away", "car"), ("away", "bus"),
     ]  # fmt: skip
     assert [one for one in ways(after) if one[0] == "second"] == [("second", "here", "truck")]
     assert {one.class_name for one in events_of(after, "zone")} == {"truck"}
-    assert str(after.corrected) == "corrected: 4 events, by c.yaml; 0 of 1 minute checked"
+    assert str(after.corrected) == "corrected: 7 events, by c.yaml; minutes checked: 0 of 0.17"
     flows = [(row.origin, row.destination, row.class_name) for row in after.flows() if row.count]
     assert flows == [
         ("line", None, "bus"), ("line", None, "car"), ("second", "line", "truck"),
     ]  # fmt: skip
-    trucks = Corrections.read(path).apply(before, ["truck", "bus"])
+    trucks = corrected(before, path, classes=("truck", "bus"))
     assert ways(trucks) == [way for way in ways(after) if way[2] != "car"]
 
 
 def test_a_vehicle_that_another_run_does_not_miss_is_not_added(tmp_path: Path) -> None:
     before = counts()
     events = [error(event, None) for event in before.events if event.name != "zone"]
-    review = Corrections.read(saved(tmp_path / "c.yaml", *events, missed(8.5), missed(8.6)))
-    assert len(review.apply(before).events) == len(before.events) + 2
+    path = saved(tmp_path / "c.yaml", *events, missed(8.5), missed(8.6))
+    assert len(corrected(before, path).events) == len(before.events) + 2
     better = replace(before.events[0], time=8.2, name="line", direction="away", vehicle=9, id=9)
     rerun = replace(before, events=(*before.events, better))
-    after = review.apply(rerun)
+    after = corrected(rerun, path)
     assert ways(after)[-2:] == [("line", "away", "bus"), ("line", "away", "bus")]
     assert after.corrected
-    assert after.corrected.events == 2
-    alone = Corrections.read(saved(tmp_path / "c.yaml", missed(8.5)))
-    assert ways(alone.apply(rerun)) == [
+    assert len(after.corrected.corrections) == 2
+    assert ways(corrected(rerun, saved(tmp_path / "c.yaml", missed(8.5)))) == [
         (one.name, one.direction, "bus" if one is better else "car") for one in rerun.events
     ]
 
@@ -133,7 +138,7 @@ def test_the_class_and_the_direction_of_one_event_are_one_correction(tmp_path: P
     both = error(car, None) | {"error": ["class", "direction"], "correct": ["truck", "here"]}
     for neighbours in ([], [error(bus, None)]):
         path = saved(tmp_path / "c.yaml", both, *neighbours)
-        after = Corrections.read(path).apply(video)
+        after = corrected(video, path)
         assert [(one.id, *way[1:]) for one, way in zip(after.events, ways(after), strict=True)] == [
             (1, "here", "truck"), (2, "here", "bus"),
         ]  # fmt: skip
@@ -143,53 +148,77 @@ def test_the_class_and_the_direction_of_one_event_are_one_correction(tmp_path: P
 
 
 def test_checked_minutes_of_a_sample_say_how_many_passed_in_all(tmp_path: Path) -> None:
+    """As files of vdet 1.1 have them: no list, and the first frame is at 1.5 s."""
     first = events_of(counts(), "line")[0]
-    cars = [replace(first, time=150 + 60.0 * n, id=n, vehicle=n) for n in range(10)]
-    video = replace(counts(), events=tuple(cars), spans=((121.5, 721.4),))
+    cars = [replace(first, time=148.5 + 60.0 * n, id=n, vehicle=n) for n in range(10)]
+    video = replace(counts(), events=tuple(cars), spans=((120.0, 719.9),))
     checked = [{"line": line, "start": 121.5, "end": 301.5} for line in ("line", "second")]
     checked.append({"line": "line", "start": 361.5, "end": 421.5})
     values = {"start": 1.5, "sample": {"seed": 1, "minutes": [4, 2, 3]}, "checked": checked}
-    path = saved(tmp_path / "c.yaml", missed(190), error(cars[5], "false"), **values)
-    corrected = Corrections.read(path).apply(video).corrected
-    assert corrected
-    assert str(corrected) == "corrected: 2 events, by c.yaml; 3 of 10 minutes checked"
-    errors = [CountError(minute=1, counted=None, true="bus")]
-    true = estimate({"car": [1] * 10}, errors, checked=range(3), drawn=range(3))
-    assert corrected.estimates == tuple(true)
+    path = saved(tmp_path / "c.yaml", missed(190), error(cars[5], "false", time=450.0), **values)
+    after = corrected(video, path).corrected
+    assert after
+    assert str(after).startswith(
+        "corrected: 2 events, by c.yaml; minutes checked: 3 of 10; at checked lines 10 counted, "
+        "10 corrected, 1"
+    )
+    here, away = VehicleGroup("line", "here"), VehicleGroup("line", "away")
+    car, bus = VehicleGroup(class_name="car"), VehicleGroup(class_name="bus")
+    none = [0] * 10
+    table = {ALL: [1] * 10, away: none, here: [1] * 10}
+    table |= {
+        VehicleGroup("second", "away"): none,
+        VehicleGroup("second", "here"): none,
+        car: [1] * 10,
+    }
+    errors = [CountError(1, (), (ALL, away, bus)), CountError(5, (ALL, here, car), ())]
+    assert after.estimates == tuple(estimate(table, errors, checked=range(3), drawn=range(3)))
     path = saved(tmp_path / "c.yaml", missed(190), start=1.5)
-    unchecked = Corrections.read(path).apply(video).corrected
-    assert unchecked == Corrected(1, ("c.yaml",), checked=0, minutes=10)
+    unchecked = corrected(video, path).corrected
+    assert unchecked
+    assert (unchecked.checked, unchecked.estimates) == ((), ())
 
 
 def test_half_a_second_is_near_enough_after_another_run(tmp_path: Path) -> None:
     before = counts()
     event = events_of(before, "line")[0]
     near = saved(tmp_path / "near.yaml", error(event, "false", time=event.time + 0.4, id=99))
-    assert len(Corrections.read(near).apply(before).events) == len(before.events) - 1
+    assert len(corrected(before, near).events) == len(before.events) - 1
     far = saved(tmp_path / "far.yaml", error(event, "false", time=event.time + 0.6))
     with pytest.raises(ConfigError, match=r"far\.yaml: line, .* s, here, car: no such event"):
-        Corrections.read(far).apply(before)
+        corrected(before, far)
 
 
 def test_a_file_for_another_video_or_line_is_rejected(tmp_path: Path) -> None:
-    settings = SETTINGS.model_copy(update={"traffic": SETTINGS.traffic.for_frames(*SIZE)})
+    begin = datetime(2026, 5, 1, 7, tzinfo=UTC)
+    known = SourceVideo("a/in.mp4", *SIZE, length=10.0, begin=begin)
 
-    def check(name: str | None = "in.mp4", **values: Any) -> None:
-        reviews = read_corrections([saved(tmp_path / "c.yaml", **values)])
-        count_frames([], settings, SIZE, corrections=reviews, name=name)
+    def check(source: SourceVideo | None = known, **values: Any) -> None:
+        video = replace(counts(), source=source)
+        corrected(video, saved(tmp_path / "c.yaml", **values))
 
     check()
     check(None)
     twice = {**BORDERS[0], "start": [400, 800], "end": [2000, 800]}
-    check(size=[2 * side for side in SIZE], lines=[twice])
+    check(None, size=[2 * side for side in SIZE], lines=[twice])
     check(lines=[{**BORDERS[0], "start": [200.8, 400]}])
-    with pytest.raises(ConfigError, match=r"c\.yaml: corrects in\.mp4, .* videos: other\.mp4"):
-        check("other.mp4")
+    for name in ("in.mp4", "a/in.mp4", "/data/a/in.mp4"):
+        check(video=name, length=10.4, begin="2026-05-01T09:00:00+02:00")
+    for name in ("other.mp4", "b/in.mp4"):
+        with pytest.raises(ConfigError, match=r"c\.yaml: corrects .*, .* videos: a/in\.mp4"):
+            check(video=name)
+    for values, fault in (
+        ({"size": [2560, 1440], "lines": [twice]}, "frames of 1280×720, not 2560×1440"),
+        ({"length": 20.0}, r"a length of 10\.0 s, not 20\.0 s"),
+        ({"begin": "2026-05-02T07:00:00+00:00"}, "the beginning 2026-05-01 07:00:00"),
+    ):
+        with pytest.raises(ConfigError, match=rf"corrects another in\.mp4: this one has {fault}"):
+            check(**values)
     for wrong in ({"start": [203, 400]}, {"left": "off"}, {"name": "new"}):
         with pytest.raises(ConfigError, match="is not where these settings have it"):
             check(lines=[{**BORDERS[0], **wrong}])
     with pytest.raises(ConfigError, match=r"c\.yaml: size: points are for frames of 1280×720"):
-        check(size=[720, 720], lines=[{**BORDERS[0], "end": [700, 400]}])
+        check(None, size=[720, 720], lines=[{**BORDERS[0], "end": [700, 400]}])
 
 
 def test_two_reviewers_are_merged_unless_they_contradict_each_other(tmp_path: Path) -> None:
@@ -200,11 +229,11 @@ def test_two_reviewers_are_merged_unless_they_contradict_each_other(tmp_path: Pa
         span = [{"line": "line", "start": 0, "end": 10}] if checked else []
         a = saved(tmp_path / "a.yaml", error(first, "class", "bus"), error(second, "false"))
         b = saved(tmp_path / "b.yaml", *events, checked=span)
-        [review] = read_corrections([a, b])
-        return review.apply(before)
+        return corrected(before, a, b)
 
     both = merged(error(first, "class", "bus"), error(second, "false"), checked=True)
-    assert str(both.corrected) == "corrected: 2 events, by a.yaml, b.yaml; 1 of 1 minute checked"
+    text = "corrected: 5 events, by a.yaml, b.yaml; minutes checked: 0.17 of 0.17; "
+    assert str(both.corrected).startswith(text)
     assert merged().events == both.events
     contradictions = (
         ([error(first, "class", "truck")], False),
@@ -223,28 +252,32 @@ def test_several_videos_are_corrected_by_the_files_that_name_them(tmp_path: Path
     other_car = replace(car, vehicle=2)
     ways_of_line = (("line", "here"), ("line", "away"))
     videos = {
-        "a": Counts((car,), ways_of_line, ()),
-        "b": Counts((replace(car, time=1.0), other_car), ways_of_line, ()),
+        "a": Counts((car,), ways_of_line, (), spans=((0.0, 10.0),)),
+        "b": Counts((replace(car, time=1.0), other_car), ways_of_line, (), spans=((0.0, 10.0),)),
     }
     files = [
         saved(tmp_path / "1.yaml", missed(8.5), video="a.mp4"),
         saved(tmp_path / "2.yaml", missed(8.5), video="b.mp4"),
         saved(tmp_path / "3.yaml", error(videos["b"].events[0], "class", "bus"), video="b.mp4"),
     ]
-    names: dict[str, str | None] = {"a": "a.mp4", "b": "b.mp4"}
-    reviews = by_video(read_corrections(files), names, SETTINGS.traffic)
-    after = apply_corrections(videos, reviews)
+    named = {
+        key: replace(video, source=SourceVideo(f"{key}.mp4", *SIZE))
+        for key, video in videos.items()
+    }
+    reviews = [Corrections.read(path) for path in files]
+    after = apply_corrections(named, reviews, SETTINGS)
     assert [(one.class_name, one.vehicle) for one in after["a"].events] == [("bus", 1), ("bus", 3)]
     assert [(one.class_name, one.vehicle) for one in after["b"].events] == [
         ("bus", 1), ("car", 2), ("bus", 4),
     ]  # fmt: skip
     assert [str(video.corrected) for video in after.values()] == [
-        "corrected: 1 event, by 1.yaml; 0 of 1 minute checked",
-        "corrected: 2 events, by 2.yaml, 3.yaml; 0 of 1 minute checked",
+        "corrected: 2 events, by 1.yaml; minutes checked: 0 of 0.17",
+        "corrected: 2 events, by 2.yaml, 3.yaml; minutes checked: 0 of 0.17",
     ]  # fmt: skip
     for wrong in ({"a": "a.mp4"}, {"a": "a.mp4", "b": "a.mp4"}, {"a": None, "b": None}):
+        sources = {key: SourceVideo(name, *SIZE) if name else None for key, name in wrong.items()}
         with pytest.raises(ConfigError, match=r"[123]\.yaml: corrects .*, which must be"):
-            by_video(read_corrections(files), wrong, SETTINGS.traffic)
+            by_video(reviews, sources, SETTINGS.traffic)
 
 
 def test_mistakes_have_a_position(tmp_path: Path) -> None:
@@ -272,4 +305,5 @@ def test_corrections_make_the_counts_of_a_drawn_camera_exact() -> None:
         (), ("missed",), ("false",), ("class",),
     }  # fmt: skip
     assert by_class(counted) != by_class(truth)
-    assert by_class(corrections.apply(counted)) == by_class(truth)
+    after = apply_corrections({"": counted}, [corrections], scene.settings)[""]
+    assert by_class(after) == by_class(truth)

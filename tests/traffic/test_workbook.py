@@ -15,8 +15,8 @@ from vdet.config.schema import Settings
 from vdet.findings import Finding
 from vdet.pages.traffic import page_table
 from vdet.traffic.clock import Clock
-from vdet.traffic.counts import Corrected, Counts, Event
-from vdet.traffic.estimate import Estimate
+from vdet.traffic.counts import Corrected, Correction, Counts, Event
+from vdet.traffic.estimate import Estimate, VehicleGroup
 from vdet.traffic.measures import HEAVY_NAMED, movement
 from vdet.traffic.survey import Survey
 from vdet.traffic.workbook import Sheet, SheetTable, write_workbook
@@ -73,7 +73,26 @@ def test_times_show_their_offset_where_the_clock_changes(tmp_path: Path) -> None
 
 def morning() -> dict[str, Counts]:
     """An hour and ten minutes in two files: three vehicles cross the junction, one gets lost."""
-    bus = Estimate(group="bus", counted=0, true=1.2, low=0.9, high=2.7, minutes_to_precision=9)
+    bus = Estimate(
+        VehicleGroup(class_name="bus"),
+        0,
+        corrected=1,
+        true=1.2,
+        low=0.9,
+        high=2.7,
+        minutes_to_precision=9,
+    )
+    north = Estimate(
+        VehicleGroup("north", "in"),
+        1,
+        corrected=2,
+        true=2.2,
+        low=1.8,
+        high=3.4,
+        minutes_to_precision=9,
+    )
+    counted = (event(60, "north", "in", 1, "bus"), event(70, "south", "out", 1, "bus"))
+    added = event(1000, "north", "in", 2, "truck")
     hour = counts(
         BEGIN,
         3599.96,
@@ -85,7 +104,19 @@ def morning() -> dict[str, Counts]:
         event(1010, "east", "out", 2, "truck"),
         event(3599, "south", "in", 3, "car"),
         findings=(Finding("line", "east: this line is shorter than a vehicle; make it longer"),),
-        corrected=Corrected(2, ("fixes.yaml",), checked=20, minutes=60, estimates=(bus,)),
+        corrected=Corrected(
+            counted=counted,
+            corrections=(
+                Correction(counted[0], event(60, "north", "in", 1, "car"), "Ann", BEGIN),
+                Correction(None, added, "Ann", BEGIN),
+                Correction(counted[1], None),
+            ),
+            files=("fixes.yaml",),
+            names=("north",),
+            checked=((0.0, 600.0), (1500.0, 2100.0)),
+            observed=3600.0,
+            estimates=(bus, north),
+        ),
     )
     rest = counts(
         BEGIN + timedelta(hours=1),
@@ -129,7 +160,7 @@ def table(text: str) -> list[str]:
 
 
 def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> None:
-    empty = " -" * 12
+    empty = " -" * 13
     line = "east: this line is shorter than a vehicle; make it longer [line]"
     doubts = f"{line}; the image is dark [dark]".replace(" ", "_")
     heavy = HEAVY_NAMED.replace(" ", "_")
@@ -144,28 +175,29 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
         time_zone UTC+02:00 {empty}
         clock from_its_name {empty}
         interval 30min {empty}
-        checked 1_of_2_files {empty}
+        checked 20_of_70_minutes {empty}
         conditions {doubts} {empty}
         heavy_share {heavy} {empty}
         program vdet_{__version__} {empty}
         - - {empty}
         Checks - {empty}
-        file corrected_by minutes_checked of_minutes events_corrected class counted estimated
-            at_least at_most - - - -
-        07.jsonl fixes.yaml 20 60 2 bus 0 1 1 3 - - - -
+        file corrected_by minutes_checked events_corrected line_or_zone direction class counted
+            corrected estimated at_least_(95_%) at_most_(95_%) - - -
+        07.jsonl fixes.yaml 20_of_60 3 all   -  bus 0 1 1 1 3 - - -
+        07.jsonl fixes.yaml 20_of_60 3 north in -   1 2 2 2 3 - - -
         - - {empty}
         Volumes - {empty}
-        line_or_zone direction all_vehicles per_hour car truck tractor heavy,_% PCU peak_hour
+        line_or_zone direction counted corrected per_hour car truck tractor heavy,_% PCU peak_hour
             vehicles_in_it peak_hour_factor median_km/h 85_%_km/h
-        north in        2 1.7 1 1 0 50  3.5 07:00:00 2 0.5 41.5 41.5
-        north out       1 0.9 1 0 0 0   1   -        - - - -
-        east  in        1 0.9 0 0 1 0   1   -        - - - -
-        east  out       1 0.9 0 1 0 100 2.5 07:00:00 1 0.25 - -
-        south in        1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
-        south out       1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
-        box   enter     1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
-        box   exit      1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
-        all_flows -     4 3.4 2 1 1 25  5.5 07:00:00 3 0.75 41.5 41.5"""
+        north in        1 2 1.7 1 1 0 50  3.5 07:00:00 2 0.5 41.5 41.5
+        north out       1 1 0.9 1 0 0 0   1   -        - - - -
+        east  in        1 1 0.9 0 0 1 0   1   -        - - - -
+        east  out       0 1 0.9 0 1 0 100 2.5 07:00:00 1 0.25 - -
+        south in        0 1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        south out       1 1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        box   enter     0 1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        box   exit      0 1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
+        all_flows -     - 4 3.4 2 1 1 25  5.5 07:00:00 3 0.75 41.5 41.5"""
     assert lines_of(book)["Summary"] == table(facts)
 
 
@@ -174,21 +206,26 @@ NOTHING = "0 0 0 0 0 - 0"
 
 def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) -> None:
     sheets = lines_of(book)
-    first, second = "07:00:00 07:30:00 1800 -", "07:30:00 08:00:00 1800 -"
-    part = "08:00:00 08:30:00 600 part"
+    assert sheets["Checks"] == table("""
+        file time_in_the_file line_or_zone counted_as class right class reviewer saved
+        07.jsonl 0:01:00 north in  bus in car   Ann 07:00:00
+        07.jsonl 0:16:40 north -   -   in truck Ann 07:00:00
+        07.jsonl 0:01:10 south out bus -  -     -   -""")
+    first, second = "07:00:00 07:30:00 1800 - 0", "07:30:00 08:00:00 1800 - 0"
+    part = "08:00:00 08:30:00 600 part 0"
     numbers = "all_vehicles per_hour car truck tractor heavy,_% PCU"
     assert sheets["Intervals"] == table(f"""
-        start end observed,_s part line_or_zone direction {numbers}
-        {first}  north in    2 4 1 1 0 50  3.5
-        {first}  north out   {NOTHING}
+        start end observed,_s part checked,_s line_or_zone direction {numbers}
+        {first[:-1]}900  north in    2 4 1 1 0 50  3.5
+        {first[:-1]}900  north out   {NOTHING}
         {first}  east  in    {NOTHING}
         {first}  east  out   1 2 0 1 0 100 2.5
         {first}  south in    {NOTHING}
         {first}  south out   1 2 1 0 0 0   1
         {first}  box   enter 1 2 1 0 0 0   1
         {first}  box   exit  1 2 1 0 0 0   1
-        {second} north in    {NOTHING}
-        {second} north out   {NOTHING}
+        {second[:-1]}300 north in    {NOTHING}
+        {second[:-1]}300 north out   {NOTHING}
         {second} east  in    {NOTHING}
         {second} east  out   {NOTHING}
         {second} south in    1 2 1 0 0 0   1
@@ -204,13 +241,13 @@ def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) 
         {part}   box   enter {NOTHING}
         {part}   box   exit  {NOTHING}""")
     assert sheets["Flows"] == table(f"""
-        start end observed,_s part from to {numbers}
-        {first}  north south  1 2 1 0 0 0   1
-        {first}  north east   1 2 0 1 0 100 2.5
+        start end observed,_s part checked,_s from to {numbers}
+        {first[:-1]}900  north south  1 2 1 0 0 0   1
+        {first[:-1]}900  north east   1 2 0 1 0 100 2.5
         {first}  south north  {NOTHING}
         {first}  east  (none) {NOTHING}
-        {second} north south  {NOTHING}
-        {second} north east   {NOTHING}
+        {second[:-1]}300 north south  {NOTHING}
+        {second[:-1]}300 north east   {NOTHING}
         {second} south north  1 2 1 0 0 0   1
         {second} east  (none) {NOTHING}
         {part}   north south  {NOTHING}
@@ -221,9 +258,9 @@ def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) 
         f"""
         start end observed,_s part N_left N_through N_right N_U-turn N_all
             E_left E_through E_right E_U-turn E_all S_left S_through S_right S_U-turn S_all
-        {first}  1 1 0 0 2 0 0 0 0 0 0 0 0 0 0
-        {second} 0 0 0 0 0 0 0 0 0 0 0 1 0 0 1
-        {part}   0 0 0 0 0 0 0 0 0 0 0 0 0 0 0
+        {first[:-2]}  1 1 0 0 2 0 0 0 0 0 0 0 0 0 0
+        {second[:-2]} 0 0 0 0 0 0 0 0 0 0 0 1 0 0 1
+        {part[:-2]}   0 0 0 0 0 0 0 0 0 0 0 0 0 0 0
         all - - - 1 1 0 0 2 0 0 0 0 0 0 1 0 0 1""".replace("\n            ", " ")
     )
 
@@ -284,8 +321,8 @@ def test_without_clocks_and_classes_there_are_times_of_the_video(tmp_path: Path)
     sheets = lines_of(written(tmp_path / "c.xlsx", Survey({"a\udcff": video}, plain)))
     assert "Turning movements" not in sheets
     assert sheets["Intervals"][:2] == table("""
-        start end observed,_s part line_or_zone direction all_vehicles per_hour
-        0:00:00 0:59:59.960000 3599.96 - north in 1 1""")
+        start end observed,_s part checked,_s line_or_zone direction all_vehicles per_hour
+        0:00:00 0:59:59.960000 3599.96 - 1200 north in 1 1""")
     assert sheets["Vehicles"] == table("""
         time_in_the_file file line_or_zone direction vehicle class score
         0:00:05.500000 a\\udcff north in 1 vehicle 0.9""")

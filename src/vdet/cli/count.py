@@ -81,17 +81,20 @@ def count(
     outputs = options.requested_outputs((), paths)
     from vdet.pages.traffic import survey_image
     from vdet.run.sinks.protocol import check_sinks
-    from vdet.traffic.corrections import read_corrections
+    from vdet.traffic.correcting import all_classes, apply_corrections
+    from vdet.traffic.corrections import Corrections
     from vdet.traffic.counting import count_files
     from vdet.traffic.survey import Survey
 
     inputs = source.inputs(*tracks, *corrections, settings=settings)
     files = OutputFiles(overwrite=overwrite, inputs=inputs, is_last=True)
     check_sinks(outputs, files)
-    reviews, scene = read_corrections(corrections), survey_image(settings)
+    reviews, scene = list(map(Corrections.read, corrections)), survey_image(settings)
     with progress_bars(" files") as progress:
         advance = progress("", len(tracks) if len(tracks) > 1 else None)
-        videos = count_files(tracks, settings, size, rate, corrections=reviews, advance=advance)
+        counting = all_classes(settings, reviews)
+        videos = count_files(tracks, counting, size, rate, advance=advance)
+    videos = apply_corrections(videos, reviews, settings)
     for name, result in videos.items():
         if result.clock:
             announce(f"{name}: begins {result.clock}")

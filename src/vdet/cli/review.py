@@ -15,6 +15,7 @@ from vdet.run.sinks import Output
 @click.argument("source_path", type=options.PATH, metavar="IN")
 @options.tracks_from_option(required=True)
 @options.output_folder("-o", "--output", required=True, help="Folder for the page, review.html.")
+@options.corrections_option
 @options.start_option
 @options.end_option
 @options.settings_options()
@@ -22,6 +23,7 @@ from vdet.run.sinks import Output
 def review(
     source_path: Path,
     output: Path,
+    corrections: options.Paths,
     tracks: Path,
     start: Fraction | None,
     end: Fraction | None,
@@ -31,7 +33,8 @@ def review(
     """Write a page for checking the counts of a video.
 
     IN is a video, read again but not searched. The page has a strip of each line, which shows
-    everything that crossed it, with a mark for each counted vehicle. It saves corrections.
+    everything that crossed it, with a mark for each counted vehicle. It saves corrections, and
+    opens those of --corrections.
 
     \b
     Example:
@@ -51,6 +54,7 @@ def review(
         end=end,
         overwrite=overwrite,
         settings_files=(*source.files, tracks),
+        corrections=corrections,
     )
     with progress_bars(" frames") as progress:
         run_video(run, tracks=tracks, progress=progress, is_last=True)

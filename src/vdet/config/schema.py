@@ -61,8 +61,8 @@ class LaneSettings(Shape):
 
 Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
-    "cut", "frame-rate", "ground", "lane-geometry", "line", "nothing-found", "small-frames",
-    "traces", "uncertain",
+    "corrections", "cut", "frame-rate", "ground", "lane-geometry", "line", "nothing-found",
+    "small-frames", "traces", "uncertain",
 ]  # fmt: skip
 """What makes a result doubtful; docs/conditions.md explains each."""
 

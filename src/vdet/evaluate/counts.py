@@ -1,5 +1,6 @@
 """Accuracy of counts at lines, by direction and class, where a reviewer has checked them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,7 +11,10 @@ from vdet.config.document import Document
 from vdet.config.loading import validated
 from vdet.errors import TruthError
 from vdet.evaluate.output import figure, table
-from vdet.traffic.corrections import Corrections, ReviewedEvent, paired
+from vdet.traffic.correcting import judge
+from vdet.traffic.corrections import Corrections
+from vdet.traffic.counts import Counts, Event, class_of
+from vdet.traffic.reviewed import ReviewedEvent
 from vdet.traffic.tables import VIDEO, read_table
 
 _COLUMNS = "time", "name", "direction", "class", "id"
@@ -45,10 +49,10 @@ class CountScore:
         """Return a key that sorts by line, direction and class; sums come last."""
         return tuple((name == ALL, name) for name in (self.name, self.direction, self.class_name))
 
-    def add(self, passed: ReviewedEvent | None, counted: ReviewedEvent | None) -> None:
+    def add(self, passed: Event | None, counted: Event | None) -> None:
         """Add a vehicle that passed, as it was counted; None: it did not, or was not."""
         is_passed, is_counted = (
-            event is not None and self.class_name in (ALL, event.class_name)
+            event is not None and self.class_name in (ALL, class_of(event))
             for event in (passed, counted)
         )
         self.passed += is_passed
@@ -56,7 +60,7 @@ class CountScore:
         self.missed += is_passed and not counted
         self.false += is_counted and not passed
         if is_passed and passed and counted:
-            self.misnamed += passed.class_name != counted.class_name
+            self.misnamed += class_of(passed) != class_of(counted)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -86,28 +90,38 @@ def score_counts(path: Path, truth: Corrections) -> list[CountScore]:
     """
     if not truth.checked:
         raise TruthError(f"{truth.source}: nothing was checked; check some minutes in the page")
-    # A strip shows only two directions: not what appears or vanishes in a zone.
-    shown = {(name, way) for name, ways in truth.traffic.directions.items() for way in ways[:2]}
+    checked = tuple(span.model_copy(update={"complete": True}) for span in truth.checked)
+    truth = truth.model_copy(update={"checked": checked})
+    zones = tuple(zone.name for zone in truth.zones)
+    counts = Counts(_read_events(path), (), zones, spans=((-math.inf, math.inf),))
     scores: dict[tuple[str, str, str], CountScore] = {}
-    for passed, counted in paired(truth.passed(), _read_events(path)):
-        event = passed or counted
-        if event and (event.name, event.direction) in shown and truth.has_checked(event):
-            classes = {ALL, *(side.class_name for side in (passed, counted) if side)}
-            keys = {(event.name, event.direction, class_name) for class_name in classes}
-            for key in (*keys, (ALL, ALL, ALL)):
-                scores.setdefault(key, CountScore(*key)).add(passed, counted)
+    for item in judge(counts, truth, []):
+        sides = [(item.right, item.counted)]
+        if item.right and item.counted and item.right.direction != item.counted.direction:
+            sides = [(item.right, None), (None, item.counted)]
+        for passed, counted in sides:
+            event = passed or counted
+            if event and truth.lists(event):
+                classes = {ALL, *(class_of(side) for side in (passed, counted) if side)}
+                keys = {(event.name, event.direction, class_name) for class_name in classes}
+                for key in (*keys, (ALL, ALL, ALL)):
+                    scores.setdefault(key, CountScore(*key)).add(passed, counted)
     return sorted(scores.values(), key=CountScore.order)
 
 
-def _read_events(path: Path) -> list[ReviewedEvent]:
-    rows, events = read_table(path, _COLUMNS), []
+def _read_events(path: Path) -> tuple[Event, ...]:
+    rows, events = read_table(path, _COLUMNS), list[Event]()
     if rows and VIDEO in rows[0]:
         raise TruthError(f"{path}: has several videos; count each on its own")
     for line, row in enumerate(rows, start=2):
         values: dict[str, Any] = {name: row[name] for name in ("time", "direction", "id")}
         values |= {"line": row["name"], "class": row["class"] or UNKNOWN}
-        events.append(validated(ReviewedEvent, Document(f"{path}:{line}", values)))
-    return events
+        row_event = validated(ReviewedEvent, Document(f"{path}:{line}", values))
+        name, way, number = row_event.name, row_event.direction, row_event.id
+        events.append(
+            Event(row_event.time, 0, name, way, number, number, row_event.true_class, 1.0)
+        )
+    return tuple(events)
 
 
 def count_lines(scores: Sequence[CountScore]) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from operator import attrgetter
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -63,6 +63,12 @@ class Label(NamedTuple):
         return self._replace(track=replace(track, class_name=name, score=score))
 
 
+def may_be_same(first: str, second: str) -> bool:
+    """Return whether two paths have the same name, and the same last folders, if both have any."""
+    paths = (PurePath(path).parts[::-1] for path in (first, second))
+    return all(a == b for a, b in zip(*paths, strict=False))
+
+
 def boxes_of(labels: Iterable[Label]) -> Float64Array:
     """Return x1, y1, x2, y2 of labels in pixels from 0, float64 `(n, 4)`."""
     boxes = (label.track.box for label in labels)
@@ -115,11 +121,13 @@ class SourceVideo:
     Attributes
     ----------
     name
-        The file name without folder.
+        The path as it was given.
     width, height
         Size of the upright frames, pixels.
     rate
         Frames per second, on average.
+    length
+        Duration as the file declares it, seconds; None if unknown.
     start, end
         The part that was processed, seconds from the first frame; None: no limit.
     begin, begin_source
@@ -136,6 +144,7 @@ class SourceVideo:
     width: int = Field(ge=1, le=100_000)
     height: int = Field(ge=1, le=100_000)
     rate: float | None = None
+    length: float | None = None
     start: float | None = None
     end: float | None = None
     begin: Annotated[AwareDatetime, Field(ge=EARLIEST, le=LATEST)] | None = None

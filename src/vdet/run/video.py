@@ -15,7 +15,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import as_model, load_detector
 from vdet.detect.protocol import StageImages, stage_images_of, warnings_of
 from vdet.errors import ConfigError, FrameSizeError, TruthError, VideoError
-from vdet.files import FileIds, OutputFiles, valid_text
+from vdet.files import FileIds, OutputFiles
 from vdet.findings import Finding, Findings, at_places, without
 from vdet.media import Frame, VideoInfo
 from vdet.media.reader import VideoReader
@@ -30,7 +30,7 @@ from vdet.run.threads import read_async
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, check_intervals, find_clock
 from vdet.traffic.counts import Corrected, Counts
-from vdet.traffic.live import LiveTraffic
+from vdet.traffic.live import LiveTraffic, source_video
 from vdet.traffic.records import VehicleRecord
 from vdet.workers import core_count
 
@@ -140,10 +140,11 @@ def saved_tracks(
     `size` is that of the frames, pixels. Without a video, the first frame of the file is the first
     one of the video. Raises `TruthError`, also if the tracks are of frames of another size.
     """
-    from vdet.labels.reading import read_tracks  # most runs read none
+    from vdet.labels.label import may_be_same  # most runs read no tracks
+    from vdet.labels.reading import read_tracks
 
     saved = read_tracks(tracks, float(video.rate) if video else None, size)
-    if video and saved.video and saved.video.name != video.name:
+    if video and saved.video and not may_be_same(saved.video.name, video.name):
         log.warning("%s: is of %s, not %s", tracks, saved.video.name, video.name)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
@@ -226,23 +227,15 @@ class Results(Iterator[FrameResult]):
 
     def _read(self, parts: Parts | None, tracks: Path | None) -> Generator[FrameResult | None]:
         """Yield None when the video is open, and then the results."""
-        run, settings, clock, corrections = self._run, self._run.settings, None, None
+        run, settings = self._run, self._run.settings
         model = parts or (None if tracks else Parts(load_detector(settings.detector)))
-        if run.corrections:  # most runs have none, and load nothing for them
-            from vdet.traffic.corrections import by_video, read_corrections
-
-            name, reviews = valid_text(run.source.name), read_corrections(run.corrections)
-            corrections = by_video(reviews, {name: name}, settings.traffic)[name]
         with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, frames):
-            self.reader, info = reader, reader.info
+            self.reader = reader
             if model:
                 results = self._searched(model, frames)
-                clock = find_clock(run.source, settings, tags=info.tags, length=info.duration)
             elif tracks:
                 results = self._saved(tracks, frames)
-            width, height = info.width, info.height
-            traffic = LiveTraffic(settings, width, height, clock, corrections=corrections)
-            self.traffic = traffic
+            self.traffic = traffic = live_traffic(run, reader.info)
             yield None
             with closing(results):
                 for result in results:
@@ -284,6 +277,20 @@ class Results(Iterator[FrameResult]):
             of_frame = shown.get(frame.index, ())
             yield FrameResult(source, frame, NO_BOXES, of_frame, searched=False)
         self.facts[FINDINGS] = Findings(saved.findings)
+
+
+def live_traffic(run: Run, info: VideoInfo) -> LiveTraffic:
+    """Return what counts in the frames of a run. Raises `ConfigError` if corrections do not fit."""
+    clock = find_clock(run.source, run.settings, tags=info.tags, length=info.duration)
+    source = source_video(info, clock) if run.settings.traffic else None
+    corrections = None
+    if run.corrections:  # most runs have none, and load nothing for them
+        from vdet.traffic.corrections import Corrections, by_video
+
+        reviews = map(Corrections.read, run.corrections)
+        corrections = by_video(reviews, {"": source}, run.settings.traffic)[""]
+    size = info.width, info.height
+    return LiveTraffic(run.settings, *size, clock, source=source, corrections=corrections)
 
 
 @contextmanager

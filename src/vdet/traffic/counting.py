@@ -12,14 +12,13 @@ from vdet.config.classes import standard_class
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
 from vdet.findings import Finding, at_places, without
-from vdet.labels.label import SavedTracks
+from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.labels.reading import read_head, read_tracks
 from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
 from vdet.regions import Regions
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import SEAM, Clock, Span, find_clock
-from vdet.traffic.corrections import Corrections, apply_corrections, by_video
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts
 from vdet.traffic.seams import MovingVehicles, Overlap, find_overlap
@@ -49,7 +48,6 @@ def count_files(
     size: tuple[int, int] | None = None,
     rate: float | None = None,
     *,
-    corrections: Sequence[Corrections] = (),
     advance: Advance = lambda _: None,
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks of one camera at the lines and zones of the settings.
@@ -66,8 +64,6 @@ def count_files(
         Width and height of the frames, pixels; None: from the file, else from `camera.size`.
     rate
         Frames per second, for a file without times.
-    corrections
-        Those of videos that are counted, one for each video at most.
     advance
         Called after each file with 1.
 
@@ -82,11 +78,10 @@ def count_files(
         other vehicles then.
     ConfigError
         The lines do not fit the frames, the size of the frames is unknown, a name does not match
-        the pattern of the clock, or no file needs the `rate`; the corrections do not fit.
+        the pattern of the clock, or no file needs the `rate`.
     """
-    names: dict[str, str | None] = {}
     rate_is_used = rate is None
-    recording = _Recording(_all_classes(settings, corrections))
+    recording = _Recording(settings)
     distinct = list(dict.fromkeys(paths))
     order = recording.in_order(distinct) if len(distinct) > 1 else [(distinct[0], None)]
     for path, clock_of_head in order:
@@ -100,13 +95,11 @@ def count_files(
             clock = find_clock(path, settings, saved=saved)
         if not (saved.video or settings.classes):
             saved = _without_people(path, saved, settings)
-        names[str(path)] = saved.video.name if saved.video else None
         recording.add(path, saved, clock, _frame_size(settings, size or saved.size))
         advance(1)
     if not rate_is_used:
         raise ConfigError("rate: changes nothing, because the tracks have times; remove it")
-    reviews = by_video(corrections, names, settings.traffic)
-    return apply_corrections(recording.counts(), reviews, settings.classes)
+    return recording.counts()
 
 
 def _without_people(path: Path, saved: SavedTracks, settings: Settings) -> SavedTracks:
@@ -121,27 +114,13 @@ def _without_people(path: Path, saved: SavedTracks, settings: Settings) -> Saved
 
 
 def count_frames(
-    frames: Iterable[FrameTracks],
-    settings: Settings,
-    size: tuple[int, int] | None = None,
-    *,
-    corrections: Sequence[Corrections] = (),
-    name: str | None = None,
+    frames: Iterable[FrameTracks], settings: Settings, size: tuple[int, int] | None = None
 ) -> Counts:
-    """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`.
-
-    `name` is that of the video, for the corrections; None if unknown.
-    """
+    """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`."""
     frame_size = _frame_size(settings, size)
-    group = _Group(_all_classes(settings, corrections), frame_size)
-    reviews = by_video(corrections, {"": name}, settings.traffic)
+    group = _Group(settings, frame_size)
     group.add(_CountedVideo("", frame_size), frames)
-    return apply_corrections(group.counts(), reviews, settings.classes)[""]
-
-
-def _all_classes(settings: Settings, corrections: Sequence[Corrections]) -> Settings:
-    """Return settings without a selection of classes if there are corrections, of any class."""
-    return settings.model_copy(update={"classes": ()}) if corrections else settings
+    return group.counts()[""]
 
 
 def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
@@ -164,7 +143,7 @@ class _CountedVideo:
         Times of its first frame, and from which on frames count.
     is_complete
         Whether its last frame is known, also without a vehicle.
-    findings
+    findings, source
         As in `Counts`.
     shift, frame_shift, id_shift
         What converts its times, and the numbers of its frames and tracks, to those of the group.
@@ -179,6 +158,7 @@ class _CountedVideo:
     clock: Clock | None = None
     first: float = 0.0
     is_complete: bool = True
+    source: SourceVideo | None = None
     findings: tuple[Finding, ...] = ()
     meter: SpeedMeter | None = None
     start: float = -math.inf
@@ -209,6 +189,8 @@ class _CountedVideo:
             spans=spans,
             clock=self.clock,
             findings=(*self.findings, *group.findings),
+            source=self.source,
+            left_out=self.start if self.start > self.first else None,
         )
         return with_speeds(of_video, self.meter)
 
@@ -258,7 +240,9 @@ class _Recording:
     ) -> None:
         """Count in the next video, whose frames have this size."""
         before = self._latest
-        video = _CountedVideo(str(path), size, clock, saved.first_time, saved.covered is not None)
+        video = _CountedVideo(
+            str(path), size, clock, saved.first_time, saved.covered is not None, saved.video
+        )
         video.findings = at_places(saved.findings)
         if self._is_chain and before:
             video.clock = _clock_after(before[0], video)

@@ -6,7 +6,8 @@ Tables cover the whole video or intervals of it. Several videos have one table.
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from itertools import accumulate, pairwise, product
+from datetime import datetime
+from itertools import accumulate, chain, pairwise, product
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from vdet.config.classes import UNKNOWN
@@ -19,6 +20,8 @@ from vdet.traffic.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from vdet.labels.label import SourceVideo
 
 Direction = tuple[str, str]
 """Name of a line or zone, and of a direction."""
@@ -52,7 +55,7 @@ class Event:
     class_name
         Class of the vehicle; None if the detector has no classes.
     score
-        Score of the track in `frame`, 0 to 1.
+        Score of the track in `frame`, 0 to 1; None if a reviewer added the event.
     seconds
         How long the vehicle was in the zone, for exit and vanish; else None.
     speed, speed_sd
@@ -60,6 +63,8 @@ class Event:
     mean_speed
         Mean speed since the previous event of the same track, from the positions at both events,
         km/h; None if unknown.
+    source
+        "reviewer" if a reviewer added the event; its frame and id are -1.
     """
 
     time: float
@@ -69,11 +74,12 @@ class Event:
     id: int
     vehicle: int
     class_name: str | None
-    score: float
+    score: float | None
     seconds: float | None = None
     speed: float | None = None
     speed_sd: float | None = None
     mean_speed: float | None = None
+    source: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +162,8 @@ class ZoneRow:
     entered, left
         Vehicles that entered or appeared, and that left or vanished.
     mean, max
-        Mean and maximum number of vehicles inside, over the video in the interval.
+        Mean and maximum number of vehicles inside, over the video in the interval; None if
+        corrections leave a vehicle that entered and did not leave, or the reverse.
     mean_stay, max_stay
         Of the vehicles that left or vanished, seconds; None if none did.
     observed, is_part
@@ -168,12 +175,25 @@ class ZoneRow:
     name: str
     entered: int
     left: int
-    mean: float
-    max: int
+    mean: float | None
+    max: int | None
     mean_stay: float | None
     max_stay: float | None
     observed: float
     is_part: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """An event as it was counted, and as it is right; None: it was not counted, or is not right.
+
+    `reviewer` and `saved` say who corrected it, and when, if that is known.
+    """
+
+    counted: Event | None
+    right: Event | None
+    reviewer: str | None = None
+    saved: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,26 +202,48 @@ class Corrected:
 
     Attributes
     ----------
-    events
-        How many events were corrected.
+    counted
+        The events before.
+    corrections
+        What was corrected.
     files
         The names of the files of corrections.
-    checked, minutes
-        How many minutes were checked, and how many there are.
+    names
+        The lines and zones that were checked.
+    checked
+        When all of these were checked, seconds in the video.
+    observed
+        How many seconds the video has.
     estimates
-        The true number of events at the checked lines and zones, of all classes; empty if too few
-        minutes of a sample were checked.
+        The true number of events at these lines and zones: of all, of each direction, and of each
+        class; empty if too little of a sample was checked.
+    faults
+        A sentence for each correction that does not fit the counts.
     """
 
-    events: int
-    files: tuple[str, ...]
-    checked: int
-    minutes: int
+    counted: tuple[Event, ...] = ()
+    corrections: tuple[Correction, ...] = ()
+    files: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    checked: tuple[Span, ...] = ()
+    observed: float = 0.0
     estimates: tuple[Estimate, ...] = ()
+    faults: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        corrected = f"corrected: {quantity(self.events, 'event')}, by {', '.join(self.files)}"
-        return f"{corrected}; {self.checked} of {quantity(self.minutes, 'minute')} checked"
+        events = f"corrected: {quantity(len(self.corrections), 'event')}"
+        text = f"{events}, by {', '.join(self.files)}; minutes checked: {self.minutes}"
+        for total in self.estimates[:1]:
+            true, low, high = map(round, (total.true, total.low, total.high))
+            text += f"; at checked lines {total.counted} counted, {total.corrected} corrected, "
+            text += f"{true} estimated (95 %: {low} to {high})"
+        return text
+
+    @property
+    def minutes(self) -> str:
+        """How many minutes were checked, and of how many."""
+        checked = sum(end - start for start, end in self.checked)
+        return f"{minutes(checked)} of {minutes(self.observed)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,6 +287,10 @@ class Counts:
         The names of the lines and zones at which flows neither begin nor end.
     classes
         The classes of vehicles that can be counted; those of tracks may be others.
+    source
+        The video; None if unknown.
+    left_out
+        Until when frames are not counted because another video has them, seconds; None: no frames.
     traces
         What passed without a track, if strips were searched for it.
     """
@@ -259,6 +305,8 @@ class Counts:
     traces: tuple[Trace, ...] = ()
     outside_flows: tuple[str, ...] = ()
     classes: tuple[str, ...] = ()
+    source: "SourceVideo | None" = field(default=None, compare=False)
+    left_out: float | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -436,6 +484,11 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     return [FlowRow(*values) for values in tally.rows(groups.ordered_flows)]
 
 
+def minutes(seconds: float) -> str:
+    """Return seconds as minutes, in one digit after the point at least."""
+    return f"{round(seconds / 60, 1 if seconds >= 60 else 2):g}"
+
+
 def per_hour(count: float, seconds: float) -> float | None:
     """Return the number of vehicles per hour of video; None without video."""
     return round(3600 * count / seconds, 1) if seconds else None
@@ -452,11 +505,28 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
                 time = intervals.seconds(index, event.time)
                 change = _Change(time, 1 if event.direction in _IN else -1, event.seconds)
                 changes[intervals.number_at(time)].append(change)
-        inside = 0
+        inside, of_zone = 0, list[ZoneRow]()
+        levels = list(accumulate(c.vehicles for c in sorted(chain.from_iterable(changes.values()))))
+        is_known = not any(video.corrected for video in videos) or is_balanced(levels)
         for period in intervals.periods:
-            rows.append(_zone_row(name, period, sorted(changes[period.number]), inside))
+            of_zone.append(_zone_row(name, period, sorted(changes[period.number]), inside))
             inside += sum(change.vehicles for change in changes[period.number])
+        rows += of_zone if is_known else [replace(row, mean=None, max=None) for row in of_zone]
     return rows
+
+
+def is_balanced(levels: Sequence[int]) -> bool:
+    """Return whether numbers of vehicles inside a zone are possible, and nobody remains."""
+    return not levels or (min(levels) >= 0 and levels[-1] == 0)
+
+
+def unbalanced_zones(video: Counts) -> list[str]:
+    """Return the zones that more vehicles leave than enter, or the reverse."""
+    changes: dict[str, list[int]] = {name: [] for name in video.zones}
+    for event in video.events:
+        if event.name in changes:
+            changes[event.name].append(1 if event.direction in _IN else -1)
+    return [name for name, each in changes.items() if not is_balanced(list(accumulate(each)))]
 
 
 @dataclass(frozen=True, slots=True, order=True)

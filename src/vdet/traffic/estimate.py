@@ -1,4 +1,4 @@
-"""How right a count is: the true count, estimated by the minutes that were checked.
+"""How right a count is: the true count, estimated by the spans that were checked.
 
 The page of a review computes the same in `estimate.js`, which explains the method and its sources.
 """
@@ -14,7 +14,7 @@ from vdet.boxes import Int64Array
 from vdet.traffic.sample import STRATA, strata_of
 
 MIN_CHECKED = 3
-"""Minimum number of drawn minutes that an interval needs."""
+"""Minimum number of drawn spans that an interval needs."""
 PRECISION = 0.02
 """Half of the width of an interval that is precise enough, as a fraction of the true count."""
 _Z = 1.959964
@@ -25,45 +25,62 @@ _ADDED = 0.6
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleGroup:
+    """Vehicles in a direction of a line or zone, vehicles of a class, or all: `ALL`."""
+
+    name: str | None = None
+    direction: str | None = None
+    class_name: str | None = None
+
+
+ALL = VehicleGroup()
+
+
+_HIDDEN = 0.1
+"""Part of the vehicles of a span that may be missed together in one that was not checked: it widens
+the upper limit, so that it holds where errors come in bursts.
+"""
+
+
+@dataclass(frozen=True, slots=True)
 class CountError:
     """An error that a person found: a vehicle that is missed, counted wrongly or named wrongly.
 
     Attributes
     ----------
-    minute
-        Number of the minute, from 0.
+    span
+        Index of the span.
     counted
-        Class (or any other group, such as a direction) it was counted as; None if it was missed.
+        The groups in which it was counted; none if it was missed.
     true
-        Class it should be counted as; None if no vehicle passed.
+        The groups in which it is right; none if no vehicle passed.
     """
 
-    minute: int
-    counted: str | None
-    true: str | None
+    span: int
+    counted: Collection[VehicleGroup]
+    true: Collection[VehicleGroup]
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """The true number of vehicles of a class.
+    """The true number of vehicles of a group.
 
     Attributes
     ----------
-    group
-        The class; None for all vehicles.
-    counted
-        Number that was counted in all minutes.
+    counted, corrected
+        Number that was counted in all spans, and with all known errors corrected.
     true
         Estimate of the true number.
     low, high
         Its interval of 95 %.
     minutes_to_precision
-        How many more drawn minutes are expected to bring half of the width of the interval to 2 %
-        of the true number; 0 if it is that narrow.
+        How many more drawn spans are expected to bring half of the width of the interval to 2 % of
+        the true number; 0 if it is that narrow.
     """
 
-    group: str | None
+    group: VehicleGroup
     counted: int
+    corrected: int
     true: float
     low: float
     high: float
@@ -71,51 +88,60 @@ class Estimate:
 
 
 def estimate(
-    counted: Mapping[str, Sequence[int]],
+    counted: Mapping[VehicleGroup, Sequence[int]],
     errors: Sequence[CountError],
     checked: Collection[int],
     drawn: Collection[int],
 ) -> list[Estimate]:
-    """Estimate the true number of all vehicles, then of each class.
+    """Estimate the true number of vehicles in each group.
 
     Parameters
     ----------
     counted
-        Number of vehicles of each class counted in each minute of the video.
+        Number of vehicles of each group counted in each span of the video, also of `ALL`.
     errors
-        The errors in checked minutes.
+        All known errors; the estimate uses those in checked spans.
     checked
-        Minutes that were checked. Those that were not drawn count as they are, and say nothing
-        about the others.
+        Spans that were checked. Those that were not drawn count as they are, and say nothing about
+        the others.
     drawn
-        The minutes drawn by `draw_minutes`.
+        The spans drawn by `draw_spans`.
 
     Returns
     -------
-    An estimate for all vehicles and each class; empty if minutes are left and fewer than
-    `MIN_CHECKED` drawn ones are checked.
+    An estimate for each group; empty if spans are left and fewer than `MIN_CHECKED` drawn ones are
+    checked.
     """
-    traffic = np.sum([list(numbers) for numbers in counted.values()], axis=0)
-    sample = np.array(sorted(set(checked) & set(drawn)), np.int64)
-    unchecked = np.array(sorted(set(range(len(traffic))) - set(checked)), np.int64)
+    traffic = np.asarray(counted[ALL], np.int64)
+    sample = np.array(sorted({*checked} & {*drawn}), np.int64)
+    unchecked = np.array(sorted({*range(len(traffic))} - {*checked}), np.int64)
     if len(unchecked) and len(sample) < MIN_CHECKED:
         return []
     survey = _CheckedSample(traffic, errors, sample, unchecked)
-    classes = sorted(set(counted) | {error.true for error in errors if error.true})
-    groups = [(name, counted.get(name, np.zeros_like(traffic))) for name in classes]
-    return [survey.estimate(name, np.asarray(group)) for name, group in [(None, traffic), *groups]]
+    groups = dict.fromkeys((*counted, *(group for error in errors for group in error.true)))
+    none = np.zeros_like(traffic)
+    return [survey.estimate(name, np.asarray(counted.get(name, none))) for name in groups]
+
+
+def sums(estimates: Sequence[Estimate]) -> tuple[float, float, float]:
+    """Return the true number in several videos, and its interval: their errors are independent."""
+    true = sum(item.true for item in estimates)
+    below = hypot(*(item.true - item.low for item in estimates))
+    return true, true - below, true + hypot(*(item.high - item.true for item in estimates))
 
 
 @dataclass(frozen=True, slots=True)
 class _Unchecked:
-    """The errors of one kind in unchecked minutes.
+    """The errors of one kind in unchecked spans.
 
     Attributes
     ----------
     number
         Its estimate.
     single, scatter
-        Its variance if errors come independently, and by the scatter between minutes.
+        Its variance if errors come independently, and by the scatter between spans.
+    hidden
+        The variance of errors that come together, of which the sample need not have any.
     weight
         Number of unchecked errors that one in the sample stands for.
     limit
@@ -125,57 +151,65 @@ class _Unchecked:
     number: float
     single: float
     scatter: float
+    hidden: float
     weight: float
     limit: float
 
-    def bounds(self, minutes: int, unchecked: float, spread: float) -> tuple[float, float]:
-        """Return its interval, for a sample of `minutes`.
+    def bounds(self, spans: int, unchecked: float, spread: float) -> tuple[float, float]:
+        """Return its interval, for a sample of `spans`.
 
         The number of errors is multiplied by `unchecked`, variances and `weight` by `spread`.
         """
         number, weight = self.number * unchecked, self.weight * spread
-        single, scatter = self.single * spread, self.scatter * spread
+        single, scatter, hidden = (
+            variance * spread for variance in (self.single, self.scatter, self.hidden)
+        )
         added = _ADDED * weight
-        high = _gamma(number + added, single + added * (weight + 1), _Z)
+        high = _gamma(number + added, single + added * (weight + 1) + hidden, _Z)
         if not number:
             return 0.0, min(high, self.limit)
-        student = _student(minutes - 1)
+        student = _student(spans - 1)
         low = min(_gamma(number, single, -_Z), _gamma(number, scatter, -student))
-        return max(low, 0.0), min(max(high, _gamma(number, scatter, student)), self.limit)
+        return max(low, 0.0), min(max(high, _gamma(number, scatter + hidden, student)), self.limit)
 
 
 @dataclass(frozen=True, slots=True)
 class _CheckedSample:
-    """Counted minutes (traffic, (minutes,) int64), with the errors found in a sample of them."""
+    """Counted spans (traffic, (spans,) int64), with the errors found in a sample of them."""
 
     traffic: Int64Array
     errors: Sequence[CountError]
     sample: Int64Array
     unchecked: Int64Array
 
-    def estimate(self, group: str | None, numbers: Int64Array) -> Estimate:
-        """Return the estimate of a class; `numbers` are its vehicles in each minute."""
+    def estimate(self, group: VehicleGroup, numbers: Int64Array) -> Estimate:
+        """Return the estimate of a group; `numbers` are its vehicles in each span."""
         counted = int(numbers.sum())
         added, removed = np.zeros_like(numbers), np.zeros_like(numbers)
         for error in self.errors:
-            is_true, is_counted = (
-                name is not None and group in (None, name) for name in (error.true, error.counted)
-            )
-            added[error.minute] += is_true and not is_counted
-            removed[error.minute] += is_counted and not is_true
+            added[error.span] += group in error.true and group not in error.counted
+            removed[error.span] += group in error.counted and group not in error.true
         corrected = counted + int(added.sum() - removed.sum())
+        added[self.unchecked] = removed[self.unchecked] = 0
+        known = counted + int(added.sum() - removed.sum())
         if not len(self.unchecked):
-            return Estimate(group, counted, corrected, corrected, corrected, 0)
-        gains = self._expected(added, self.traffic + 1, inf)  # empty minutes have errors too
-        losses = self._expected(removed, numbers, float(numbers[self.unchecked].sum()))
-        true = corrected + gains.number - losses.number
+            return Estimate(group, counted, corrected, known, known, known, 0)
+        unseen = _HIDDEN * float(numbers.mean())
+        gains = self._expected(added, self.traffic + 1, inf, unseen)  # empty spans have errors too
+        losses = self._expected(removed, numbers, float(numbers[self.unchecked].sum()), 0.0)
+        true = known + gains.number - losses.number
         below, above = self._widths(gains, losses, 0)
         widths = [-sum(self._widths(gains, losses, more)) for more in range(len(self.unchecked))]
         more = bisect_left(widths, -2 * PRECISION * true)
-        return Estimate(group, counted, true, true - below, true + above, more)
+        return Estimate(group, counted, corrected, true, true - below, true + above, more)
 
-    def _expected(self, errors: Int64Array, size: Int64Array, limit: float) -> _Unchecked:
-        """Estimate errors from those in each minute, which are in proportion to `size`."""
+    def _expected(
+        self, errors: Int64Array, size: Int64Array, limit: float, unseen: float
+    ) -> _Unchecked:
+        """Estimate errors from those in each span, which are in proportion to `size`.
+
+        In a span that is not checked, `unseen` errors may come together.
+        """
         strata = strata_of(self.traffic)
         numbers = np.bincount(strata[self.sample], minlength=STRATA)
         members = np.bincount(strata[self.unchecked], minlength=STRATA) + numbers
@@ -184,25 +218,27 @@ class _CheckedSample:
         unchecked_size = float(size[self.unchecked].sum())
         weighted = float((weights * sizes).sum())
         if not weighted:  # nothing is known
-            return _Unchecked(0.0, 0.0, 0.0, limit, limit)
+            return _Unchecked(0.0, 0.0, 0.0, 0.0, limit, limit)
         weights *= unchecked_size / weighted
         number, variances = float((weights * errors).sum()), weights * (weights + 1)
         rate = number / unchecked_size if unchecked_size else 0.0
         scatter = variances * (errors - rate * sizes) ** 2
+        weight = unchecked_size / float(sizes.sum())
         return _Unchecked(
             number=number,
             single=float((variances * errors).sum()) * max(0.0, 1 - number / (limit or 1)),
             scatter=float(scatter.sum()) * len(sizes) / (len(sizes) - 1),
-            weight=unchecked_size / float(sizes.sum()),
+            hidden=weight * (weight + 1) * unseen**2,
+            weight=weight,
             limit=limit,
         )
 
     def _widths(self, gains: _Unchecked, losses: _Unchecked, more: int) -> tuple[float, float]:
-        """Return the parts of the interval below and above the estimate after `more` minutes."""
-        minutes, unchecked = len(self.sample) + more, 1 - more / len(self.unchecked)
-        spread = unchecked * len(self.sample) / minutes
-        low, high = gains.bounds(minutes, unchecked, spread)
-        least, most = losses.bounds(minutes, unchecked, spread)
+        """Return the parts of the interval below and above the estimate after `more` spans."""
+        spans, unchecked = len(self.sample) + more, 1 - more / len(self.unchecked)
+        spread = unchecked * len(self.sample) / spans
+        low, high = gains.bounds(spans, unchecked, spread)
+        least, most = losses.bounds(spans, unchecked, spread)
         gained, lost = gains.number * unchecked, losses.number * unchecked
         return hypot(gained - low, most - lost), hypot(high - gained, lost - least)
 

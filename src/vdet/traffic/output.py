@@ -11,7 +11,17 @@ from typing import Any
 
 from vdet.config.shapes import NOWHERE
 from vdet.traffic import counts as tables
-from vdet.traffic.counts import CountRow, Counts, Event, EventGroups, FlowRow, Key, Tally, ZoneRow
+from vdet.traffic.counts import (
+    Corrected,
+    CountRow,
+    Counts,
+    Event,
+    EventGroups,
+    FlowRow,
+    Key,
+    Tally,
+    ZoneRow,
+)
 from vdet.traffic.tables import VIDEO, is_json, plain_time
 
 _HEADINGS = {
@@ -130,7 +140,7 @@ def _json(
         notes = [str(item) for item in video.findings if item.severity == "note"]
         by_video[name] = {"begin": begin, "warnings": list(video.warnings), "notes": notes}
         if video.corrected:
-            by_video[name]["corrected"] = asdict(video.corrected)
+            by_video[name]["corrected"] = _corrected(video.corrected)
         if video.traces:
             by_video[name]["traces"] = [asdict(trace) for trace in video.traces]
         if events:
@@ -138,6 +148,46 @@ def _json(
             by_video[name]["events"] = [dict(zip(_EVENTS, row, strict=True)) for row in rows]
     facts = by_video.popitem()[1] if len(videos) == 1 else {"videos": by_video}
     return {"interval": interval, **tables, **facts}
+
+
+def _corrected(corrected: Corrected) -> dict[str, Any]:
+    corrections = [
+        {
+            "counted": _place(item.counted),
+            "right": _place(item.right),
+            "reviewer": item.reviewer,
+            "saved": plain_time(item.saved),
+        }
+        for item in corrected.corrections
+    ]
+    estimates = [
+        {
+            "name": item.group.name,
+            "direction": item.group.direction,
+            "class": item.group.class_name,
+            "counted": item.counted,
+            "corrected": item.corrected,
+            "estimated": round(item.true, 1),
+            "low": round(item.low, 1),
+            "high": round(item.high, 1),
+            "more": item.minutes_to_precision,
+        }
+        for item in corrected.estimates
+    ]
+    return {
+        "events": len(corrections),
+        "files": list(corrected.files),
+        "names": list(corrected.names),
+        "checked": [list(span) for span in corrected.checked],
+        "corrections": corrections,
+        "estimates": estimates,
+    }
+
+
+def _place(event: Event | None) -> dict[str, Any] | None:
+    keys = "time", "name", "direction", "class"
+    values = event and (event.time, event.name, event.direction, event.class_name)
+    return dict(zip(keys, values, strict=True)) if values else None
 
 
 def _is_table(path: Path, kind: str) -> bool:

@@ -15,7 +15,7 @@ from vdet.traffic import counts as tables
 from vdet.traffic import measures
 from vdet.traffic.clock import SEAM, ClockTime, Interval, Intervals
 from vdet.traffic.counts import Counts, GroupedEvent, Key, Tally, ZoneRow, class_of, names_in
-from vdet.traffic.estimate import Estimate
+from vdet.traffic.estimate import Estimate, sums
 from vdet.traffic.workbook import Cell, Sheet, SheetTable
 from vdet.version import __version__
 
@@ -23,7 +23,9 @@ _TIMES = "start", "end", "observed, s", "part"
 _DIRECTION = "line or zone", "direction"
 _FLOW = "from", "to"
 _PEAK = "peak hour", "vehicles in it", "peak hour factor"
-_ESTIMATE = "class", "counted", "estimated", "at least", "at most"
+_ESTIMATED = "estimated", "at least (95 %)", "at most (95 %)"
+_ESTIMATE = *_DIRECTION, "class", "counted", "corrected", *_ESTIMATED
+_CHECKED = "counted", "corrected", *_ESTIMATED
 _SPEEDS = "median km/h", "85 % km/h"
 _ALL = "all"
 _MOST = 3
@@ -36,7 +38,8 @@ heavy: the share of trucks and buses. all flows: each vehicle once, at its first
 flow: from the first line or zone of a vehicle to the last, in the interval of the first. \
 {NOWHERE}: it was counted at one only; turning movements leave it out.
 turning movement: N left is from the northern arm of the junction to the left.
-checks: the true number of passages at all checked lines and zones, with its interval of 95 %."""
+checks: the true number of passages at all checked lines and zones, with its interval of 95 %.
+counted: by vdet. corrected, all vehicles: by reviewers. estimated: by checked spans."""
 
 
 class Survey:
@@ -72,6 +75,7 @@ class Survey:
         single = {
             "Intervals": self._by_interval(_DIRECTION, self.groups.directions),
             "Flows": self._by_interval(_FLOW, self.groups.flows),
+            "Checks": self._corrections(),
             "Turning movements": self._movements(),
             "Zones": self._zones(),
             "Vehicles": self._vehicles(),
@@ -87,7 +91,6 @@ class Survey:
         """Return what the survey is, when and how it was made, and whether it is in doubt."""
         survey, whole = self.settings.survey, self._whole
         files = quantity(len(self.videos), "file")
-        checked = sum(counts.corrected is not None for counts in self.counts)
         doubts = list(dict.fromkeys(text for counts in self.counts for text in counts.warnings))
         if more := len(doubts[_MOST:]):
             doubts[_MOST:] = [f"and {quantity(more, 'other')}, see Notes"]
@@ -104,7 +107,7 @@ class Survey:
             "time zone": ", ".join(zones) or None,
             "clock": ", ".join(clocks) or "unknown: times are those of the video",
             "interval": self.settings.traffic.interval or "the whole time",
-            "checked": f"{checked} of {files}" if checked else "no, counted automatically",
+            "checked": self._checked(),
             "conditions": "; ".join(doubts) or "no doubts",
             "heavy share": measures.HEAVY_NAMED if len(self._classes) > 1 else None,
             "program": f"vdet {__version__}",
@@ -112,12 +115,22 @@ class Survey:
         rows = [fact for fact in facts.items() if fact[1] is not None]
         return SheetTable((), rows, survey.site or "Traffic survey")
 
+    def _checked(self) -> str:
+        """Return how many minutes of all files were checked."""
+        every = [counts.corrected for counts in self.counts if counts.corrected]
+        checked = sum(end - start for item in every for start, end in item.checked)
+        if not every:
+            return "no, counted automatically"
+        observed = tables.minutes(self._whole.observed)
+        return f"{tables.minutes(checked)} of {observed} minutes"
+
     def volumes(self) -> SheetTable:
         """Return the number of vehicles in each direction, their peak hour and their speeds."""
         groups = self.groups
         rows = [*self._volumes(groups.directions, groups.directions)]
         rows += self._volumes(groups.flows, [None])
-        headings = [*_DIRECTION, *self._headings, *_PEAK, *_SPEEDS]
+        total = _CHECKED if self._is_corrected else self._headings[:1]
+        headings = [*_DIRECTION, *total, *self._headings[1:], *_PEAK, *_SPEEDS]
         return SheetTable(headings, rows, "Volumes").without_empty_columns()
 
     def _volumes(
@@ -130,7 +143,33 @@ class Survey:
         for key in keys:
             events = chain.from_iterable(groups.values()) if key is None else groups[key]
             names = names_in(key or ("all flows", ""))
-            yield [*names, *self._cells(whole, key), *_peak_hour(quarters, key), *_speeds(events)]
+            total, *cells = self._cells(whole, key)
+            totals = self._checked_total(key, total) if self._is_corrected else [total]
+            yield [*names, *totals, *cells, *_peak_hour(quarters, key), *_speeds(events)]
+
+    @property
+    def _is_corrected(self) -> bool:
+        return any(counts.corrected for counts in self.counts)
+
+    def _checked_total(self, key: tuple[str | None, ...] | None, corrected: Cell) -> list[Cell]:
+        """Return the cells below `_CHECKED` of a direction; None where they are not known."""
+        every = [counts.corrected for counts in self.counts]
+        if key is None:
+            return [None, corrected, *[None] * len(_ESTIMATED)]
+        estimates = [
+            item
+            for checked in every
+            for item in (checked.estimates if checked else ())
+            if (item.group.name, item.group.direction) == key
+        ]
+        before = sum(
+            (event.name, event.direction) == key
+            for counts in self.counts
+            for event in (counts.corrected.counted if counts.corrected else counts.events)
+        )
+        is_known = len(estimates) == len(every)
+        limits = map(round, sums(estimates)) if is_known else [None] * len(_ESTIMATED)
+        return [before, corrected, *limits]
 
     def flows(self) -> SheetTable:
         """Return the number of vehicles in each flow, the largest flow first."""
@@ -143,11 +182,24 @@ class Survey:
     ) -> SheetTable:
         """Return the number of vehicles in each group and interval."""
         tally = self.groups.tally(groups, self.settings.traffic.seconds)
-        rows = [
-            [*_interval(period), *names_in(key), *self._cells(tally, key, period)]
-            for period, key in product(tally.intervals.periods, groups)
-        ]
-        return SheetTable([*_TIMES, *names, *self._headings], rows)
+        rows = []
+        for period, key in product(tally.intervals.periods, groups):
+            checked: list[Cell] = [self._seconds_checked(tally.intervals, period, key[0])]
+            cells = self._cells(tally, key, period)
+            rows.append([*_interval(period), *checked * self._is_corrected, *names_in(key), *cells])
+        headings = [*_TIMES, *["checked, s"] * self._is_corrected]
+        return SheetTable([*headings, *names, *self._headings], rows)
+
+    def _seconds_checked(self, intervals: Intervals, period: Interval, name: str | None) -> float:
+        """Return how much of an interval was checked at a line or zone."""
+        spans = (
+            (intervals.seconds(number, start), intervals.seconds(number, end))
+            for number, counts in enumerate(self.counts)
+            if counts.corrected and name in counts.corrected.names
+            for start, end in counts.corrected.checked
+        )
+        common = (min(end, period.last) - max(start, period.first) for start, end in spans)
+        return round(sum(seconds for seconds in common if seconds > 0), 3)
 
     @property
     def _headings(self) -> list[str]:
@@ -203,13 +255,13 @@ class Survey:
     def _vehicles(self) -> SheetTable:
         """Return every passage of a vehicle at a line or zone."""
         headings = "clock", "time in the file", "file", "line or zone", "direction", "vehicle"
-        measured = "class", "score", "seconds in the zone", "km/h", "mean km/h"
+        measured = "class", "score", "seconds in the zone", "km/h", "mean km/h", "source"
         rows = list[list[Cell]]()
         for name, counts in self.videos.items():
             for event in counts.events:
                 clock = counts.clock.at(event.time) if counts.clock else None
                 passage = event.name, event.direction, event.vehicle, class_of(event)
-                values = event.score, event.seconds, event.speed, event.mean_speed
+                values = event.score, event.seconds, event.speed, event.mean_speed, event.source
                 rows.append([clock, _time(event.time), name, *passage, *values])
         return SheetTable([*headings, *measured], rows).without_empty_columns()
 
@@ -231,11 +283,33 @@ class Survey:
         rows = list[list[Cell]]()
         for name, counts in self.videos.items():
             if corrected := counts.corrected:
-                numbers = corrected.checked, corrected.minutes, corrected.events
+                numbers = corrected.minutes, len(corrected.corrections)
                 for item in corrected.estimates or [None]:
                     rows.append([name, ", ".join(corrected.files), *numbers, *_estimate(item)])
-        headings = "file", "corrected by", "minutes checked", "of minutes", "events corrected"
+        headings = "file", "corrected by", "minutes checked", "events corrected"
         return SheetTable([*headings, *_ESTIMATE], rows, "Checks")
+
+    def _corrections(self) -> SheetTable:
+        """Return every correction."""
+        headings = (
+            "file",
+            "time in the file",
+            "line or zone",
+            "counted as",
+            "class",
+            "right",
+            "class",
+        )
+        rows = list[list[Cell]]()
+        for name, counts in self.videos.items():
+            for item in counts.corrected.corrections if counts.corrected else ():
+                event = item.counted or item.right
+                assert event
+                sides = (item.counted, item.right)
+                names = [(e.direction, class_of(e)) if e else ("-", None) for e in sides]
+                by_whom = item.reviewer, item.saved
+                rows.append([name, _time(event.time), event.name, *chain(*names), *by_whom])
+        return SheetTable([*headings, "reviewer", "saved"], rows)
 
     def notes(self) -> SheetTable:
         """Return the findings of each file, and what the sheets mean."""
@@ -281,8 +355,9 @@ def _estimate(item: Estimate | None) -> list[Cell]:
     """Return the cells below `_ESTIMATE`."""
     if item is None:
         return [None] * len(_ESTIMATE)
-    group = item.group or "all vehicles"
-    return [group, item.counted, round(item.true), round(item.low), round(item.high)]
+    group, limits = item.group, (item.true, item.low, item.high)
+    names = group.name or _ALL, group.direction, group.class_name
+    return [*names, item.counted, item.corrected, *map(round, limits)]
 
 
 def _seam(before: Interval | None, file: Interval) -> str | None:

@@ -43,7 +43,7 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
     assert list(rows[0]) == [
         *("time", "clock", "frame", "name", "direction"),
         *("id", "vehicle", "class", "score", "seconds"),
-        *("speed", "speed_sd", "mean_speed"),
+        *("speed", "speed_sd", "mean_speed", "source"),
     ]
     assert float(rows[0]["time"]) == pytest.approx(28 / 25, abs=0.3)  # boxes are means of ten
     assert int(rows[0]["frame"]) == pytest.approx(25 * float(rows[0]["time"]), abs=1)

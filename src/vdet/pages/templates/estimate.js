@@ -1,20 +1,25 @@
 "use strict";
-// How right a count is. Some minutes are drawn in strata of similar traffic (vdet.traffic.sample), and checked. The true
-// count is what was counted, plus the vehicles missed, minus those counted wrongly: known in checked minutes, estimated in
+// How right a count is. Some spans are drawn in strata of similar traffic (vdet.traffic.sample), and checked. The true
+// count is what was counted, plus the vehicles missed, minus those counted wrongly: known in checked spans, estimated in
 // the unchecked. Both kinds of errors are estimated by the combined ratio estimator of stratified sampling (Cochran,
-// Sampling Techniques, 3rd ed., 1977, chapters 5 and 6), in proportion to the vehicles counted in a minute.
+// Sampling Techniques, 3rd ed., 1977, chapters 5 and 6), in proportion to the vehicles counted in a span.
 //
 // Each kind has two intervals of 95 %, and the wider limits hold: one for errors that come independently, also where none
 // was seen (Garwood 1936, for weighted sums as in Fay and Feuer, Statistics in Medicine 16, 1997), and one from the scatter
-// between minutes (Student's t), for errors that come together. The interval of the difference follows from those of both
+// between spans (Student's t), for errors that come together. The interval of the difference follows from those of both
 // kinds (Zou and Donner, Statistics in Medicine 27, 2008). Quantiles are approximated: chi-square by Wilson and Hilferty,
 // t by Cornish and Fisher. benchmarks/estimates.py measures how often the intervals hold the truth.
+const ALL = "all"; // the group of all vehicles
 const Z = 1.959964; // quantile of the normal distribution for 95 %, two-sided
-const MIN_CHECKED = 3; // drawn minutes that an interval needs
+const MIN_CHECKED = 3; // drawn spans that an interval needs
 // Errors added for the upper limit. With 1 (Garwood) it is too high: it holds 97.5 % at least. With 0.6, no error is seen in
 // at most 6.5 % of the samples where the limit for none is too low.
 const ADDED = 0.6;
 const PRECISION = 0.02; // half of the width of an interval that is precise enough, as a fraction of the true count
+
+// Part of the vehicles of a span that may be missed together in one that was not checked: it widens the upper limit, so that
+// it holds where errors come in bursts.
+const HIDDEN = 0.1;
 
 /** Return a quantile of the gamma distribution; z is that of the normal distribution. */
 function gammaQuantile(mean, variance, z) {
@@ -29,37 +34,37 @@ function studentQuantile(n) {
   return z + (z ** 3 + z) / 4 / n + second / n ** 2 + (3 * z ** 7 + 19 * z ** 5 + 17 * z ** 3 - 15 * z) / 384 / n ** 3;
 }
 
-/** Estimate the errors of one kind in unchecked minutes from their number in each minute. */
-function uncheckedErrors({ errors, size, strata, sample, unchecked, limit }) {
-  const sum = (minutes, value) => minutes.reduce((total, minute) => total + value(minute), 0);
-  const inStratum = (minutes, minute) => minutes.filter(item => strata[item] === strata[minute]).length;
-  const weights = new Map(sample.map(minute => [minute, 1 + inStratum(unchecked, minute) / inStratum(sample, minute)]));
-  const traffic = sum(unchecked, minute => size[minute]), weighted = sum(sample, minute => weights.get(minute) * size[minute]);
-  if (weighted === 0) return { number: 0, single: 0, scatter: 0, weight: limit, limit };
-  const weight = minute => weights.get(minute) * traffic / weighted;
-  const variance = minute => weight(minute) * (weight(minute) + 1);
-  const number = sum(sample, minute => weight(minute) * errors[minute]);
-  const residual = minute => traffic && errors[minute] - number / traffic * size[minute];
+/** Estimate the errors of one kind in unchecked spans from their number in each span. */
+function uncheckedErrors({ errors, size, strata, sample, unchecked, limit, unseen }) {
+  const sum = (spans, value) => spans.reduce((total, span) => total + value(span), 0);
+  const inStratum = (spans, span) => spans.filter(item => strata[item] === strata[span]).length;
+  const weights = new Map(sample.map(span => [span, 1 + inStratum(unchecked, span) / inStratum(sample, span)]));
+  const traffic = sum(unchecked, span => size[span]), weighted = sum(sample, span => weights.get(span) * size[span]);
+  if (weighted === 0) return { number: 0, single: 0, scatter: 0, hidden: 0, weight: limit, limit };
+  const weight = span => weights.get(span) * traffic / weighted;
+  const variance = span => weight(span) * (weight(span) + 1);
+  const number = sum(sample, span => weight(span) * errors[span]);
+  const residual = span => traffic && errors[span] - number / traffic * size[span];
+  const each = traffic / sum(sample, span => size[span]);
   return {
-    number, limit,
-    single: sum(sample, minute => variance(minute) * errors[minute]) * Math.max(0, 1 - number / (limit || 1)),
-    scatter: sum(sample, minute => variance(minute) * residual(minute) ** 2) * sample.length / (sample.length - 1),
-    weight: traffic / sum(sample, minute => size[minute]),
+    number, limit, hidden: each * (each + 1) * unseen ** 2, weight: each,
+    single: sum(sample, span => variance(span) * errors[span]) * Math.max(0, 1 - number / (limit || 1)),
+    scatter: sum(sample, span => variance(span) * residual(span) ** 2) * sample.length / (sample.length - 1),
   };
 }
 
-/** Return the interval of errors in unchecked minutes: for the fraction of them still unchecked, of a sample of n. */
+/** Return the interval of errors in unchecked spans: for the fraction of them still unchecked, of a sample of n. */
 function errorBounds(errors, n, unchecked, spread) {
   const number = errors.number * unchecked, weight = errors.weight * spread;
-  const single = errors.single * spread, scatter = errors.scatter * spread;
-  const added = ADDED * weight, high = gammaQuantile(number + added, single + added * (weight + 1), Z);
+  const single = errors.single * spread, scatter = errors.scatter * spread, hidden = errors.hidden * spread;
+  const added = ADDED * weight, high = gammaQuantile(number + added, single + added * (weight + 1) + hidden, Z);
   if (number === 0) return [0, Math.min(high, errors.limit)];
   const t = studentQuantile(n - 1);
   const low = Math.min(gammaQuantile(number, single, -Z), gammaQuantile(number, scatter, -t));
-  return [Math.max(low, 0), Math.min(Math.max(high, gammaQuantile(number, scatter, t)), errors.limit)];
+  return [Math.max(low, 0), Math.min(Math.max(high, gammaQuantile(number, scatter + hidden, t)), errors.limit)];
 }
 
-/** Return the parts of the interval below and above the estimate after more minutes. */
+/** Return the parts of the interval below and above the estimate after more spans. */
 function intervalWidths(gains, losses, sample, left, more) {
   const n = sample + more, unchecked = 1 - more / left, spread = unchecked * sample / n;
   const [low, high] = errorBounds(gains, n, unchecked, spread);
@@ -69,35 +74,35 @@ function intervalWidths(gains, losses, sample, left, more) {
 }
 
 /**
- * Estimate the true number of all vehicles (group null), then of each class.
+ * Estimate the true number of vehicles in each group.
  *
- * counted: { class: [vehicles in each minute] }; strata: the stratum of each minute; errors: [{ minute, counted, true }],
- * classes or null; checked, drawn: sets of minutes. Returns [{ group, counted, true, low, high, minutesToPrecision }], empty if minutes
- * are left and fewer than MIN_CHECKED of the drawn ones are checked.
+ * counted: Map of the vehicles of each group in each span, also of ALL; strata: the stratum of each span; errors:
+ * [{ span, counted, true }] with lists of groups, those in checked spans say what is missed elsewhere; checked, drawn: sets of spans. Returns [{ group, counted, true, low, high,
+ * minutesToPrecision }], empty if spans are left and fewer than MIN_CHECKED of the drawn ones are checked.
  */
 function estimateCounts({ counted, strata, errors, checked, drawn }) {
-  const minutes = strata.map((_, minute) => minute), unchecked = minutes.filter(minute => !checked.has(minute));
-  const sample = minutes.filter(minute => checked.has(minute) && drawn.has(minute));
+  const spans = strata.map((_, span) => span), unchecked = spans.filter(span => !checked.has(span));
+  const sample = spans.filter(span => checked.has(span) && drawn.has(span));
   if (unchecked.length > 0 && sample.length < MIN_CHECKED) return [];
-  const traffic = minutes.map(minute => Object.values(counted).reduce((sum, numbers) => sum + numbers[minute], 0));
-  const classes = new Set([...Object.keys(counted), ...errors.map(error => error.true).filter(name => name !== null)]);
-  return [null, ...[...classes].sort()].map(group => {
-    const number = group === null ? traffic : counted[group] ?? minutes.map(() => 0);
-    const isIn = name => name !== null && (group === null || group === name);
+  const none = spans.map(() => 0), traffic = counted.get(ALL);
+  return [...new Set([...counted.keys(), ...errors.flatMap(error => error.true)])].map(group => {
+    const number = counted.get(group) ?? none;
     const errorsIn = test => {
-      const numbers = minutes.map(() => 0);
-      errors.filter(test).forEach(error => numbers[error.minute]++);
+      const numbers = spans.map(() => 0);
+      errors.filter(test).forEach(error => numbers[error.span]++);
       return numbers;
     };
-    const added = errorsIn(error => isIn(error.true) && !isIn(error.counted));
-    const removed = errorsIn(error => isIn(error.counted) && !isIn(error.true));
+    const added = errorsIn(error => error.true.includes(group) && !error.counted.includes(group));
+    const removed = errorsIn(error => error.counted.includes(group) && !error.true.includes(group));
     const sum = numbers => numbers.reduce((total, number) => total + number, 0);
-    const corrected = sum(number) + sum(added) - sum(removed), total = { group, counted: sum(number) };
-    if (unchecked.length === 0) return { ...total, true: corrected, low: corrected, high: corrected, minutesToPrecision: 0 };
-    const size = traffic.map(vehicles => vehicles + 1), limit = sum(unchecked.map(minute => number[minute]));
-    const gains = uncheckedErrors({ errors: added, size, strata, sample, unchecked, limit: Infinity });
-    const losses = uncheckedErrors({ errors: removed, size: number, strata, sample, unchecked, limit });
-    const value = corrected + gains.number - losses.number;
+    const total = { group, counted: sum(number), corrected: sum(number) + sum(added) - sum(removed) };
+    for (const span of unchecked) added[span] = removed[span] = 0;
+    const known = sum(number) + sum(added) - sum(removed);
+    if (unchecked.length === 0) return { ...total, true: known, low: known, high: known, minutesToPrecision: 0 };
+    const size = traffic.map(vehicles => vehicles + 1), limit = sum(unchecked.map(span => number[span]));
+    const gains = uncheckedErrors({ errors: added, size, strata, sample, unchecked, limit: Infinity, unseen: HIDDEN * sum(number) / spans.length });
+    const losses = uncheckedErrors({ errors: removed, size: number, strata, sample, unchecked, limit, unseen: 0 });
+    const value = known + gains.number - losses.number;
     const [below, above] = intervalWidths(gains, losses, sample.length, unchecked.length, 0);
     let more = 0;
     while (more < unchecked.length && sum(intervalWidths(gains, losses, sample.length, unchecked.length, more)) > 2 * PRECISION * value) more++;

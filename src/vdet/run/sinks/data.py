@@ -28,6 +28,7 @@ from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output
+from vdet.traffic.live import source_video
 from vdet.traffic.records import join_records, records_content
 from vdet.traffic.tables import SUFFIXES, check_table, write_content
 from vdet.traffic.workbook import write_workbook
@@ -75,15 +76,11 @@ class TrackSink(BaseSink):
         values = settings.model_dump(mode="json", exclude_defaults=True)
         for name, section in (("detector", settings.detector), ("tracker", settings.tracker)):
             values[name] = {"kind": section.kind, **values.get(name, {})}
-        return SourceVideo(
-            name=video.name,
-            width=video.width,
-            height=video.height,
+        return replace(
+            source_video(video, clock),
             rate=round(float(video.rate), 6),
             start=None if context.start is None else float(context.start),
             end=None if context.end is None else float(context.end),
-            begin=clock.at(0.0) if clock else None,
-            begin_source=clock.source if clock else None,
             classes=settings.classes,
             program=f"vdet {__version__}",
             settings=values,

@@ -19,6 +19,7 @@ from vdet.pages.review import PAGE_NAME, EventMark, Review, StripPicture, crop_n
 from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.track.track import FrameTracks
+from vdet.traffic.correcting import correct
 from vdet.traffic.counts import Event, Trace
 from vdet.traffic.records import Crop
 from vdet.traffic.strips import (
@@ -175,23 +176,32 @@ class ReviewSink(BaseSink):
         self._end_minute(is_end=True)
         self._add_traces()
         self._write_crops(self.context.crops.end())
-        counts = self.traffic.counts()
+        counts, counted, opened = self.traffic.counts(), self.traffic.counted, None
         assert counts
+        assert counted
+        if reviewed := self.traffic.corrections:
+            settings = self.context.settings.model_copy(update={"classes": ()})
+            opened = correct({"": counted}, {"": reviewed}, settings)[""].corrected
+        corrections = opened.corrections if opened else ()
         review = Review(
             video=self.video,
             traffic=self.context.settings.traffic,
             bands=[strip.band for strip in self._strips],
             pictures=self._pictures,
-            marks=self._marks(counts.events),
+            marks=self._marks(counted.events),
             traces=counts.traces,
             findings=counts.findings,
+            counted=counted,
+            opened=opened,
+            reviewed=reviewed,
+            added=self._marks([c.right for c in corrections if c.right and not c.counted]),
         )
         with self._file.open("w", encoding="utf-8", errors="backslashreplace") as file:
             write_review(file, review, Path(self._folder.name))
         self.summary = {
             "page": f"{self.path.name}/{PAGE_NAME}",
             "key": review.key,
-            "vehicles": len({event.vehicle for event in counts.events}),
+            "vehicles": len({event.vehicle for event in counted.events}),
             "minutes": len({picture.minute for picture in self._pictures}),
         }
 

@@ -1,0 +1,285 @@
+"""Counts as reviewers say that they are right, and an estimate of what nobody has checked."""
+
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, count, pairwise
+from pathlib import Path
+
+from vdet.config.classes import is_chosen
+from vdet.config.loading import MAX_MISTAKES
+from vdet.config.schema import Settings
+from vdet.errors import ConfigError
+from vdet.findings import Finding
+from vdet.labels.label import NO_ID
+from vdet.traffic.clock import Span
+from vdet.traffic.corrections import Corrections, by_video
+from vdet.traffic.counts import (
+    Corrected,
+    Correction,
+    Counts,
+    Event,
+    class_of,
+    unbalanced_zones,
+)
+from vdet.traffic.crossings import APPEAR, ENTER
+from vdet.traffic.estimate import ALL, CountError, Estimate, VehicleGroup, estimate
+from vdet.traffic.reviewed import TOLERANCE, ReviewedEvent, paired
+from vdet.traffic.sample import EqualSpans
+
+_IMBALANCE = "{}: after corrections, more vehicles enter than leave, or fewer; occupancy is unknown"
+NO_FRAME = -1
+"""`Event.frame` of a vehicle that a reviewer added."""
+
+
+@dataclass(slots=True)
+class Judged:
+    """An event as it was counted, and as it is right; None: it is not.
+
+    `reviewed` is what a reviewer says of it, and `is_certain` whether that holds for its class and
+    direction too; else it only tells which event is which.
+    """
+
+    reviewed: ReviewedEvent | None
+    counted: Event | None
+    right: Event | None
+    is_certain: bool = False
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether it is corrected."""
+        if self.counted and self.right:
+            return replace(self.counted, time=self.right.time) != self.right
+        return self.counted is not self.right
+
+
+def all_classes(settings: Settings, reviews: Sequence[Corrections]) -> Settings:
+    """Return the settings with which to count before corrections, which may be of any class."""
+    return settings.model_copy(update={"classes": ()}) if reviews else settings
+
+
+def correct(
+    videos: Mapping[str, Counts], corrections: Mapping[str, Corrections], settings: Settings
+) -> dict[str, Counts]:
+    """Return the counts of videos, corrected where there are corrections with the same key.
+
+    In spans whose list is complete, the events are those of the list; elsewhere, single events are
+    removed, added or changed. A vehicle gets another class in all its events, also in other videos.
+    Only the classes of the settings are kept.
+    """
+    judged, faults = dict[str, list[Judged]](), dict[str, list[str]]()
+    for key, counts in videos.items():
+        faults[key] = []
+        none = [Judged(None, event, event) for event in counts.events]
+        review = corrections.get(key)
+        judged[key] = judge(counts, review, faults[key]) if review else none
+    _name_vehicles([item for items in judged.values() for item in items])
+    result = {}
+    for key, counts in videos.items():
+        chosen = [_of_classes(item, settings.classes) for item in judged[key]]
+        events = sorted(
+            (item.right for item in chosen if item.right),
+            key=lambda event: (event.time, event.frame, event.id, event.name),
+        )
+        result[key] = replace(
+            counts, events=tuple(events), classes=settings.classes or counts.classes
+        )
+        if review := corrections.get(key):
+            corrected = _corrected(counts, review, chosen, faults[key])
+            problems = [*corrected.faults, *map(_IMBALANCE.format, unbalanced_zones(result[key]))]
+            found = tuple(Finding("corrections", problem) for problem in problems)
+            findings = (*counts.findings, *found)
+            result[key] = replace(result[key], corrected=corrected, findings=findings)
+    return result
+
+
+def apply_corrections(
+    videos: Mapping[str, Counts], reviews: Sequence[Corrections], settings: Settings
+) -> dict[str, Counts]:
+    """Return the counts of saved tracks as `correct` does.
+
+    Raises
+    ------
+    ConfigError
+        As `by_video`; a correction does not fit the counts.
+    """
+    sources = {key: counts.source for key, counts in videos.items()}
+    result = correct(videos, by_video(reviews, sources, settings.traffic), settings)
+    every = (counts.corrected.faults for counts in result.values() if counts.corrected)
+    if faults := list(chain.from_iterable(every)):
+        raise ConfigError(*faults[:MAX_MISTAKES])
+    return result
+
+
+def judge(counts: Counts, review: Corrections, faults: list[str]) -> list[Judged]:
+    """Return all events that were counted or are right; add what does not fit to `faults`.
+
+    Added vehicles have no number yet.
+    """
+    start, end = counts.spans[0][0] - TOLERANCE, counts.spans[-1][1] + TOLERANCE
+    listed = [e for e in review.events if counts.left_out is None or e.time >= counts.left_out]
+    inside = [event for event in listed if start <= event.time <= end]
+    part = f"is outside the counted part, {counts.spans[0][0]:g} to {counts.spans[-1][1]:g} s"
+    faults += [f"{review.source}: {e}: {part}" for e in listed if not start <= e.time <= end]
+    classes = {event.id: event.true_class for event in listed if "class" in event.errors}
+    classes.pop(NO_ID, None)
+    result = []
+    for reviewed, event in paired(inside, counts.events):
+        is_listed = any(side and review.lists(side) for side in (reviewed, event))
+        is_certain = is_listed or bool(reviewed and reviewed.errors)
+        item = Judged(reviewed, event, event, is_certain)
+        if reviewed and is_certain and (event or is_listed or reviewed.is_missed):
+            item.right = _right(reviewed, classes.get(reviewed.id, reviewed.true_class), event)
+        elif is_listed:
+            item.right = None
+        elif reviewed and reviewed.errors:
+            faults.append(
+                f"{review.source}: {reviewed}: no such event was counted within {TOLERANCE} s; "
+                "remove this correction, or check these counts anew"
+            )
+        result.append(item)
+    _complete_visits(result, counts.zones)
+    return result
+
+
+def _right(reviewed: ReviewedEvent, class_name: str, event: Event | None) -> Event | None:
+    """Return an event as it is right; None: it is not."""
+    if reviewed.is_false:
+        return None
+    added = Event(
+        time=reviewed.time,
+        frame=NO_FRAME,
+        name=reviewed.name,
+        direction=reviewed.true_direction,
+        id=NO_ID,
+        vehicle=NO_ID,
+        class_name=class_name,
+        score=None,
+        source="reviewer",
+    )
+    if not event:
+        return added
+    name = event.class_name if class_of(event) == class_name else class_name
+    return replace(event, time=added.time, direction=added.direction, class_name=name)
+
+
+def _complete_visits(items: Sequence[Judged], zones: Collection[str]) -> None:
+    """Remove both ends of a visit to a zone if a reviewer removes one of them."""
+    visits = defaultdict[tuple[str, int], list[Judged]](list)
+    for item in items:
+        if item.counted and item.counted.name in zones:
+            visits[item.counted.name, item.counted.vehicle].append(item)
+    for ends in visits.values():
+        ends.sort(key=lambda item: item.counted.time if item.counted else 0.0)
+        for first, last in pairwise(ends):
+            is_visit = first.counted and first.counted.direction in (ENTER, APPEAR)
+            for removed, other in ((first, last), (last, first)):
+                if is_visit and not removed.right and not other.is_certain:
+                    other.right = None
+
+
+def _name_vehicles(items: Sequence[Judged]) -> None:
+    """Give added vehicles numbers, and others the class that a reviewer says, in all events."""
+    numbers = count(max((item.counted.vehicle for item in items if item.counted), default=0) + 1)
+    classes: dict[int, str | None] = {}
+    for item in sorted(items, key=lambda item: not (item.reviewed and item.reviewed.errors)):
+        if item.right and item.is_certain:
+            classes.setdefault(item.right.vehicle, item.right.class_name)
+    for item in items:
+        if not item.right:
+            continue
+        if item.right.vehicle == NO_ID:
+            item.right = replace(item.right, vehicle=next(numbers))
+        elif not item.is_certain and item.right.vehicle in classes:
+            item.right = replace(item.right, class_name=classes[item.right.vehicle])
+
+
+def _of_classes(item: Judged, chosen: Collection[str]) -> Judged:
+    """Return an event without what is not of the chosen classes."""
+    counted, right = (
+        event if event and is_chosen(event.class_name, chosen) else None
+        for event in (item.counted, item.right)
+    )
+    return replace(item, counted=counted, right=right)
+
+
+def _corrected(
+    counts: Counts, review: Corrections, items: Sequence[Judged], faults: Sequence[str]
+) -> Corrected:
+    """Return how counts were corrected."""
+    names = {span.line for span in review.checked}
+    checked = _checked(review, names)
+    return Corrected(
+        counted=tuple(item.counted for item in items if item.counted),
+        corrections=tuple(
+            Correction(item.counted, item.right, by.reviewer, by.saved)
+            for item, by in ((item, item.reviewed or review) for item in items)
+            if item.is_changed
+        ),
+        files=tuple(Path(name).name for name in review.files),
+        names=tuple(dict.fromkeys(name for name, _ in counts.directions if name in names)),
+        checked=tuple(
+            (max(start, first), min(end, last))
+            for start, end in checked
+            for first, last in counts.spans
+            if max(start, first) < min(end, last)
+        ),
+        observed=sum(last - first for first, last in counts.spans),
+        estimates=tuple(_estimates(counts, review, items, checked)),
+        faults=tuple(faults),
+    )
+
+
+def _checked(review: Corrections, names: Collection[str]) -> list[Span]:
+    """Return when all lines and zones with these names were checked."""
+    spans: list[Span] = []
+    edges = sorted({edge for span in review.checked for edge in (span.start, span.end)})
+    for start, end in pairwise(edges):
+        if all(review.has_checked(name, start) for name in names):
+            joined = spans.pop()[0] if spans and spans[-1][1] == start else start
+            spans.append((joined, end))
+    return spans
+
+
+def covers(checked: Sequence[Span], span: Span) -> bool:
+    """Return whether a span was checked, but for a frame or what is lost by rounding."""
+    start, end = span
+    return any(a < start + TOLERANCE and end < b + TOLERANCE for a, b in checked)
+
+
+def _estimates(
+    counts: Counts, review: Corrections, items: Sequence[Judged], checked: Sequence[Span]
+) -> list[Estimate]:
+    """Return the true number of events at the checked lines, as the page of the review does."""
+    (first, _), (_, last) = counts.spans[0], counts.spans[-1]
+    end = last if review.end is None else review.end
+    if not checked or first < review.start - TOLERANCE or last > end + TOLERANCE:
+        return []  # nothing is known of what lies outside the part that was reviewed
+    spans = EqualSpans(review.start, end, review.span, counts.spans)
+    names = {span.line for span in review.checked}
+    ways = [(n, way) for n, way in counts.directions if n in names and review.shows(n, way)]
+    table = {group: [0] * len(spans) for group in (ALL, *(VehicleGroup(*way) for way in ways))}
+
+    def groups(event: Event | None) -> tuple[VehicleGroup, ...]:
+        if not event or (event.name, event.direction) not in ways:
+            return ()
+        direction, kind = (
+            VehicleGroup(event.name, event.direction),
+            VehicleGroup(class_name=class_of(event)),
+        )
+        return ALL, direction, kind
+
+    errors = list[CountError]()
+    for item in items:
+        if event := item.right or item.counted:
+            index, counted, right = (
+                spans.index(event.time),
+                *map(groups, (item.counted, item.right)),
+            )
+            for group in counted:
+                table.setdefault(group, [0] * len(spans))[index] += 1
+            if counted != right:
+                errors.append(CountError(index, counted, right))
+    known = [index for index in range(len(spans)) if covers(checked, spans.bounds(index))]
+    drawn = [index for index, number in enumerate(spans.numbers) if number in review.drawn]
+    return estimate(table, errors, known, drawn)
