@@ -17,6 +17,12 @@ MIN_SIDE = 8.0
 """Minimum longer side of a vehicle, pixels; smaller vehicles are ignored."""
 _SCALES = 0.5, 2.0
 """Smallest and largest scale of an image; at 1 its width fits."""
+_CLOSE_UPS = 0.2
+"""Fraction of images that show one vehicle near, sometimes cut off by the edge."""
+_CLOSE_SIDES = 0.25, 1.2
+"""Its longer side, fraction of the image's width."""
+_MAX_MAGNIFICATION = 3.0
+"""Of its pixels: what is smaller is not shown near."""
 _MOSAIC_SCALES = 0.5, 1.5
 """Smallest and largest scale of the four images of a mosaic."""
 _MIN_VISIBLE = 0.25  # fraction of a vehicle that is left after cropping, else it is ignored
@@ -74,11 +80,14 @@ class SampleDrawer:
 
     def draw(self, rng: np.random.Generator, drawing: ImageDrawing) -> NetSample:
         """Return one training image with the vehicles in it."""
-        if rng.random() < drawing.mosaics:
+        size = drawing.width, drawing.height
+        if rng.random() < _CLOSE_UPS:
+            sample = _close_up(rng, self._pick(rng), size)
+        elif rng.random() < drawing.mosaics:
             sample = self._mosaic(rng, drawing)
         else:
             scale = drawing.magnified * _scale(rng, _SCALES)
-            sample = _random_view(rng, self._pick(rng), (drawing.width, drawing.height), scale)
+            sample = _random_view(rng, self._pick(rng), size, scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
         sample = with_signs(rng, self._paster.paste(rng, sample))
@@ -229,12 +238,55 @@ def _random_view(
     rng: np.random.Generator, sample: NetSample, size: tuple[int, int], scale: float
 ) -> NetSample:
     """Return a random view of an image, of `size`; at scale 1 its width fits."""
+    factors = scale * size[0] / sample.image.shape[1] * _random_aspect(rng)
+    return _view(rng, sample, size, factors, corner=rng.uniform(*_corners(sample, size, factors)))
+
+
+def _close_up(rng: np.random.Generator, sample: NetSample, size: tuple[int, int]) -> NetSample:
+    """Return a view in which one vehicle is large, or any view if all vehicles are small.
+
+    The middle of the vehicle may be anywhere in the view, so the edge often cuts it off.
+    """
+    sides = (sample.boxes[:, 2:] - sample.boxes[:, :2]).max(axis=1, initial=0)
+    smallest, largest = (fraction * size[0] for fraction in _CLOSE_SIDES)
+    rows = np.flatnonzero(~sample.ignored & (_MAX_MAGNIFICATION * sides > smallest))
+    if len(rows) == 0:
+        return _random_view(rng, sample, size, _scale(rng, _SCALES))
+    kind = rng.choice(np.unique(sample.classes[rows]))  # of mixed traffic, the rare classes too
+    row = rng.choice(rows[sample.classes[rows] == kind])
+    side = _scale(rng, (smallest, min(largest, _MAX_MAGNIFICATION * float(sides[row]))))
+    factors = side / sides[row] * _random_aspect(rng)
+    middle = (sample.boxes[row, :2] + sample.boxes[row, 2:]) / 2 * factors
+    corner = rng.uniform(0, size) - middle
+    return _view(
+        rng, sample, size, factors, corner=np.clip(corner, *_corners(sample, size, factors))
+    )
+
+
+def _random_aspect(rng: np.random.Generator) -> Float64Array:
+    """Return factors of width and height, whose product is 1."""
+    aspect = np.exp(rng.uniform(-_ASPECT, _ASPECT) / 2)
+    return np.array([aspect, 1 / aspect])
+
+
+def _corners(
+    sample: NetSample, size: tuple[int, int], factors: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Return the least and the greatest corner of a scaled image with which it fills the view."""
+    margin = np.array(size) - np.array(sample.image.shape[1::-1]) * factors
+    return np.minimum(margin, 0), np.maximum(margin, 0)
+
+
+def _view(
+    rng: np.random.Generator,
+    sample: NetSample,
+    size: tuple[int, int],
+    factors: Float64Array,
+    corner: Float64Array,
+) -> NetSample:
+    """Return an image scaled by `factors` and moved to `corner`, in a view of `size`."""
     width, height = size
     whole = np.array(sample.image.shape[1::-1])
-    aspect = np.exp(rng.uniform(-_ASPECT, _ASPECT) / 2)
-    factors = scale * width / whole[0] * np.array([aspect, 1 / aspect])
-    margin = np.array(size) - whole * factors
-    corner = rng.uniform(np.minimum(margin, 0), np.maximum(margin, 0))
     angle = rng.normal(0, _TILT) if rng.random() < _TILTED else 0.0
     turn = np.asarray(cv2.getRotationMatrix2D((width / 2, height / 2), angle, 1.0))
     placing = turn @ np.vstack([np.column_stack([np.diag(factors), corner]), [0, 0, 1]])

@@ -28,14 +28,17 @@ CHECKPOINT = 500
 """Steps between two checkpoints."""
 _SEED = 0
 """Seed of the weights and the images."""
-_SMALL = 0.35
+_SMALL = 0.8
 """Fraction of the steps, at the start, with images of half the size."""
 _PLAIN = 0.12
 """Fraction of the steps, at the end, without mosaics."""
 _MOSAICS = 0.35
 """Fraction of images that are mosaics of four."""
 _WARM_UP = 200
-"""Steps in which the learning rate rises, or a tenth of all if that is less."""
+"""Steps in which the learning rate rises, at the start and after a stop, or a tenth of all if that
+is less."""
+_CONSTANT = 2 / 3
+"""Fraction of the steps after which the learning rate falls."""
 _LAST_RATE = 0.02
 """Last learning rate, as a fraction of the highest."""
 _WEIGHT_DECAY = 0.02
@@ -105,15 +108,16 @@ def train_network(
     """Train a network and return it with the moving average of its weights.
 
     On a CPU the same sources and settings give the same network on the same machine. A training
-    run that was stopped resumes from its last checkpoint, also on another device. torch computes on
-    all cores; threads draw the images: one for a CPU, one per core for a GPU.
+    run that was stopped resumes from its last checkpoint, also on another machine or device. torch
+    computes on all cores; threads draw the images: one for a CPU, one per core for a GPU.
 
     Parameters
     ----------
     sources
         At least one, each with at least one sample.
     checkpoint
-        File of the last checkpoint; it is made and replaced, and read where it exists.
+        File of the last checkpoint; it is made and replaced, and read where it exists. It has the
+        moving average of the weights in half precision, and the number of steps.
     base
         An exported network whose weights are the first ones.
     device
@@ -229,12 +233,8 @@ class _Training:
             settings.learning_rate,
             weight_decay=_WEIGHT_DECAY,
         )
-        self._parts = {
-            "network": self._network,
-            "averaged": self.averaged,
-            "optimizer": self._optimizer,
-        }
         self.step = 0
+        self._resumed_at = 0
 
     def start_from(self, path: Path, batch: Batch) -> None:
         """Take the first weights from an exported network. Raises `DataError`."""
@@ -245,13 +245,12 @@ class _Training:
     @property
     def rate(self) -> float:
         """The learning rate of the next step: it rises, stays, and falls as a cosine."""
-        settings, step = self._settings, self.step
-        warm_up = min(_WARM_UP, settings.steps // 10)
-        if step < warm_up:
-            return settings.learning_rate * (step + 1) / warm_up
-        fraction = max(0.0, 2 * step / settings.steps - 1)  # of the second half
+        settings = self._settings
+        warm_up = max(1, min(_WARM_UP, settings.steps // 10))
+        rise = min(1.0, (self.step - self._resumed_at + 1) / warm_up)
+        fraction = max(0.0, (self.step / settings.steps - _CONSTANT) / (1 - _CONSTANT))
         fall = (1 + math.cos(math.pi * fraction)) / 2
-        return settings.learning_rate * (_LAST_RATE + (1 - _LAST_RATE) * fall)
+        return settings.learning_rate * rise * (_LAST_RATE + (1 - _LAST_RATE) * fall)
 
     def learn(self, batch: Batch) -> float:
         """Do one step and return its loss."""
@@ -275,19 +274,26 @@ class _Training:
                 averages[name].lerp_(value, 1 - keep)
 
     def save(self, path: Path) -> None:
-        """Write the state to a file."""
-        parts = {name: part.state_dict() for name, part in self._parts.items()}
+        """Write the averaged weights and the number of steps to a file."""
+        averaged = {
+            name: value.half() if value.ndim > 1 else value
+            for name, value in self.averaged.state_dict().items()
+        }
+        state = {"settings": self._learnt_with, "step": self.step, "averaged": averaged}
         with staged(path, overwrite=True) as temporary:
-            torch.save({"settings": self._learnt_with, "step": self.step, **parts}, temporary)
+            torch.save(state, temporary)
 
     def restore(self, path: Path) -> None:
-        """Resume from a file that `save` has written. Raises `DataError`."""
+        """Resume from the weights of a file that `save` has written. Raises `DataError`.
+
+        The optimizer starts anew, so the learning rate rises again.
+        """
         try:
             state: dict[str, Any] = torch.load(path, self._device, weights_only=True)
             same = state["settings"] == self._learnt_with
-            for name, part in self._parts.items():
-                part.load_state_dict(state[name])
-            self.step = state["step"]
+            for network in (self._network, self.averaged):
+                network.load_state_dict(state["averaged"])
+            self.step = self._resumed_at = state["step"]
         except Exception as error:  # torch raises many kinds for a file of another form
             raise DataError(
                 f"{path}: is not a checkpoint of this training run; remove it"
