@@ -24,8 +24,11 @@ from vdet.errors import DataError
 from vdet.learn.net.export import export_network, write_model
 
 
-def from_checkpoint(path: Path, output: Path) -> None:
-    """Write the averaged weights of a checkpoint as a network without a calibration of its own."""
+def from_checkpoint(path: Path, output: Path, base: Header | None) -> None:
+    """Write the averaged weights of a checkpoint as a network without a calibration of its own.
+
+    `base` is the header of the network from which the training started.
+    """
     import torch
 
     from vdet.learn.net.network import Network
@@ -35,14 +38,13 @@ def from_checkpoint(path: Path, output: Path) -> None:
     network = Network(len(settings["classes"]), settings.get("channels", 1.0))
     network.load_state_dict(state["averaged"])
     sources = [{"name": name, "images": count} for name, count in settings.pop("sources")]
-    base = settings.pop("base", "None")
+    settings.pop("base", None)
     provenance: dict[str, Any] = {
         "training": settings,
         "report": {"sources": sources, "steps": state["step"]},
     }
-    if base != "None" and Path(base).exists():
-        before = read_header(Session(Path(base)))
-        provenance["base"] = before.provenance if before else {}
+    if base is not None:
+        provenance["base"] = base.provenance
     width, height = settings.get("size") or (settings["width"], settings["height"])
     header = Header(classes=settings["classes"], pixels=width * height, provenance=provenance)
     export_network(network, header, output, overwrite=True)
@@ -91,10 +93,11 @@ def ship(
     """
     calibrated: dict[str, Any] = {}
     before = onnx.load(str(base)) if base else None  # the output may replace it
-    if base is not None:
-        calibrated = _header(base).model_dump(include={"calibration", "by_class"})
+    base_header = _header(base) if base else None
+    if base_header is not None:
+        calibrated = base_header.model_dump(include={"calibration", "by_class"})
     if weights.suffix == ".ckpt":
-        from_checkpoint(weights, output)
+        from_checkpoint(weights, output, base_header)
         source = output
     else:
         source = weights

@@ -138,7 +138,7 @@ def train_network(
         )
     learnt_with = {
         "sources": [(source.name, len(source.samples)) for source in sources],
-        "base": str(base),
+        "base": base.name if base else None,
         **settings.model_dump(),
     }
     target = _device(device)
