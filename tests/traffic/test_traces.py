@@ -178,7 +178,7 @@ def test_a_click_on_a_trace_adds_a_missed_vehicle(tmp_path: Path, run: Invoke) -
         assert window.run("return document.querySelectorAll('.mark').length") == 7
         window.run("document.querySelector('.trace').click()")
         assert window.run(
-            "return [document.querySelectorAll('.trace').length, inMinute().length]"
+            "return [document.querySelectorAll('.trace').length, inSpan().length]"
         ) == [0, 7]
         [added] = window.run("return state.missed")
     assert (added["line"], added["direction"]) == ("gate", "away")
