@@ -74,7 +74,7 @@ def test_every_box_lies_in_the_picture_and_the_same_seed_draws_the_same(
 def test_a_vehicle_of_which_little_is_left_is_ignored() -> None:
     wide = np.array([[0, 0, 256, 128]], np.float32)
     source = NetSource("wide", [NetSample(WHITE, wide, np.array([0]), np.array([False]))])
-    drawing = DrawSettings(width=256, height=128, magnified=4.0, mosaics=0.0)
+    drawing = ImageDrawing(width=256, height=128, magnified=4.0, mosaics=0.0)
     is_ignored = [draw(seed, drawing, source).ignored.all() for seed in range(20)]
     assert 12 <= sum(is_ignored) < 20  # all but those that show it near
 
