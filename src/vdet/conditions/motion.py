@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float32Array, Image
+from vdet.boxes import Box, Float32Array, Float64Array, Image
 from vdet.errors import quantity
 from vdet.findings import Finding
 from vdet.polygons import Point, Segment, meeting
@@ -78,18 +78,19 @@ class Mover:
     point: Point = (0.0, 0.0)
     size: float = 0.0
     length: float = 0.0
-    shapes: list[tuple[float, float, float]] = field(default_factory=list)
+    planes: int = 0
+    shapes: Float64Array = field(default_factory=lambda: np.zeros(3))  # sum over its planes
     crossed: set[str] = field(default_factory=set)
 
     def has_travelled(self, width: int) -> bool:
         """Return whether it travelled, in planes of this width."""
         minimum = max(_TRAVEL * width, self.size, _STRAIGHT * self.length)
-        return len(self.shapes) >= _PLANES and math.dist(self.start, self.point) >= minimum
+        return self.planes >= _PLANES and math.dist(self.start, self.point) >= minimum
 
     @property
     def is_vehicle(self) -> bool:
         """Whether it has the shape and the speed of a vehicle."""
-        is_shaped = np.mean(self.shapes, axis=0) >= (_COMPACT, _WIDE, _SHARP)
+        is_shaped = self.shapes / self.planes >= (_COMPACT, _WIDE, _SHARP)
         far = math.dist(self.start, self.point)
         return bool(is_shaped.all()) and far >= _SLOW * self.size * (self.last - self.first)
 
@@ -196,7 +197,8 @@ class MotionWatch:
             else:
                 mover = Mover(_is_in(area.center, before), area.center, time)
             mover.last, mover.point, mover.size = time, area.center, area.size
-            mover.shapes.append(area.shape)
+            mover.planes += 1
+            mover.shapes += area.shape
             self._movers.append(mover)
         for mover in lost:
             mover.is_detected |= _is_in(mover.point, self._covered)
