@@ -16,9 +16,9 @@ from typing import Any
 
 import vdet
 from benchmarks.rounds import seconds_of
-from vdet.config.detector import NetworkSettings
+from vdet.config.kinds import NetworkSettings
+from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import Label, SavedTracks
 from vdet.labels.reading import read_truth

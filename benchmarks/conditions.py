@@ -18,8 +18,8 @@ import numpy as np
 
 from vdet.boxes import Boxes, Image
 from vdet.conditions.watch import Conditions
+from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.findings import Findings
 from vdet.media import Picture
 from vdet.synthetic.render import Renderer

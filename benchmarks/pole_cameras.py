@@ -19,8 +19,8 @@ import numpy as np
 
 from benchmarks.drawn_traffic import follow
 from vdet.boxes import Float64Array
+from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import Undistorter

@@ -10,10 +10,16 @@ import cv2
 
 from benchmarks.plain import transcode
 from benchmarks.rounds import Task, measure_both
-from vdet.config.camera import CameraSettings, GroundPoint
 from vdet.config.loading import find_config, load_settings
+from vdet.config.scene import (
+    CameraSettings,
+    GroundPoint,
+    LineSettings,
+    RegionSettings,
+    TrafficSettings,
+    ZoneSettings,
+)
 from vdet.config.schema import DrawSettings, InputSettings, Settings, SvmSettings
-from vdet.config.shapes import LineSettings, RegionSettings, TrafficSettings, ZoneSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.media.reader import VideoReader

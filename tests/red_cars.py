@@ -9,18 +9,18 @@ import numpy as np
 
 from boxing import moved_to
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
-from vdet.config.detector import (
+from vdet.config.kinds import (
     FeatureSettings,
     HeatSettings,
     HistogramSettings,
     PerspectiveSettings,
+    RulesTrackerSettings,
     ScoreSettings,
     SearchSettings,
     WindowSettings,
 )
 from vdet.config.schema import Settings, SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, save_model
 from vdet.media import Frame, Picture

@@ -1,7 +1,7 @@
 """The original's settings, as they ship, for tests of its numbers."""
 
+from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.loading import find_config, load_settings
-from vdet.config.tracker import RulesTrackerSettings
 
 SEED = load_settings([find_config("seed")])
 

@@ -7,8 +7,8 @@ import numpy as np
 import PIL.Image
 import pytest
 
+from vdet.config.scene import RegionSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import RegionSettings
 from vdet.errors import ConfigError, ImageError
 from vdet.regions import Regions, check_masks
 from writing import write_image

@@ -12,9 +12,9 @@ from boxing import rounded
 from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
 from vdet.api import Tracker
 from vdet.boxes import Boxes, Image
+from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.loading import load_settings
 from vdet.config.schema import MotionTrackerSettings, Settings
-from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.media import Picture
 from vdet.run.sinks.protocol import SinkContext, SinkKind, sink_kind

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from vdet.config.loading import load_settings
+from vdet.config.scene import NOWHERE
 from vdet.config.schema import Settings
-from vdet.config.shapes import NOWHERE
 from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray, Image
-from vdet.config.shapes import RegionSettings, aspect_problem
+from vdet.config.scene import RegionSettings, aspect_problem
 from vdet.errors import ConfigError
 from vdet.media.images import read_image
 from vdet.polygons import Point

@@ -6,7 +6,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vdet.config.document import parse_assignment, parse_document, read_document
+from vdet.config.loading import parse_assignment, parse_document, read_document
 from vdet.errors import ConfigError
 
 TEXTS = st.text(max_size=20)

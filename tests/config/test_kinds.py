@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.loading import load_settings
 from vdet.config.rendering import render_settings
 from vdet.config.schema import MotionTrackerSettings, Settings
-from vdet.config.tracker import RulesTrackerSettings
 from vdet.errors import ConfigError
 
 

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.config.detector import HeatSettings, NetworkSettings, PerspectiveSettings, SearchSettings
+from vdet.config.kinds import HeatSettings, NetworkSettings, PerspectiveSettings, SearchSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.errors import ConfigError

@@ -6,12 +6,11 @@ import pytest
 import yaml
 
 from seed import SEED
-from vdet.config.document import parse_document
-from vdet.config.loading import load_settings
+from vdet.config.kinds import RulesTrackerSettings
+from vdet.config.loading import load_settings, parse_document
 from vdet.config.rendering import explanations, render_settings
+from vdet.config.scene import Shape
 from vdet.config.schema import Section, Settings, SvmSettings
-from vdet.config.shapes import Shape
-from vdet.config.tracker import RulesTrackerSettings
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SVM = Settings(detector=SvmSettings())

@@ -3,10 +3,9 @@ from typing import Any
 import pytest
 
 from seed import SEED
-from vdet.config.detector import SearchSettings, WindowSettings
+from vdet.config.kinds import RulesTrackerSettings, SearchSettings, WindowSettings
 from vdet.config.schema import Settings, SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.config.tracker import RulesTrackerSettings
 
 WINDOWS = (WindowSettings(size=64, overlap=0.5, top=400, bottom=500),)
 BOTH = Settings(

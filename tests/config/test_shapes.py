@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from vdet.config.loading import load_settings
 from vdet.config.rendering import render_settings
+from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.errors import ConfigError
 
 SQUARE = [[0.1, 0.1], [0.3, 0.1], [0.3, 0.3], [0.1, 0.3]]

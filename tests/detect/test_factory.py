@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.config.detector import DetectorSettings
+from vdet.config.kinds import DetectorSettings
 from vdet.config.schema import NetworkSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector, model_file
 from vdet.detect.onnx.detector import NetworkModel

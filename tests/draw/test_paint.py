@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from codings import in_any_coding
 from vdet.boxes import Box
-from vdet.config.shapes import LineSettings, TrafficSettings, ZoneSettings
+from vdet.config.scene import LineSettings, TrafficSettings, ZoneSettings
 from vdet.draw.boxes import (
     BLACK,
     Color,

@@ -15,7 +15,7 @@ import pytest
 
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import try_files
-from vdet.config.detector import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.kinds import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.model import FORMAT_VERSION, load_model
 from vdet.errors import ModelError
 

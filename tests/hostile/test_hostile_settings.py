@@ -11,8 +11,7 @@ import pytest
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import try_files
 from quick import only_windows
-from vdet.config.document import MAX_BYTES
-from vdet.config.loading import MAX_MISTAKES, load_settings
+from vdet.config.loading import MAX_BYTES, MAX_MISTAKES, load_settings
 from vdet.errors import ConfigError
 
 SETTINGS = """\

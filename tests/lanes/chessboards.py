@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.config.camera import LensSettings
+from vdet.config.scene import LensSettings
 
 CAMERA = LensSettings(
     size=(640, 480),

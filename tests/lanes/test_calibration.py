@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from lanes.chessboards import CAMERA, PATTERN, photographs
-from vdet.config.camera import LensSettings
+from vdet.config.scene import LensSettings
 from vdet.errors import ImageError
 from vdet.lanes.calibration import calibrate, find_corners
 from vdet.lanes.camera import Undistorter

@@ -9,8 +9,8 @@ import yaml
 
 from lanes.chessboards import CAMERA
 from vdet.boxes import Box
-from vdet.config.camera import LensSettings
 from vdet.config.loading import load_settings
+from vdet.config.scene import LensSettings
 from vdet.errors import ConfigError
 from vdet.lanes.camera import Undistorter, save_camera
 

@@ -7,8 +7,8 @@ import pytest
 
 from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
 from vdet.boxes import Float64Array
-from vdet.config.camera import CameraSettings, GroundPoint, LensSettings
 from vdet.config.loading import load_settings
+from vdet.config.scene import CameraSettings, GroundPoint, LensSettings
 from vdet.errors import ConfigError
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.ground import Ground, fit_ground, ground_of

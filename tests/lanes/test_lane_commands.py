@@ -16,8 +16,8 @@ from conftest import Run
 from lanes.roads import make_road, settings_for
 from red_cars import SETTINGS, red_finder
 from vdet.boxes import Box, Image
-from vdet.config.camera import LensSettings
-from vdet.config.detector import WindowSettings
+from vdet.config.kinds import WindowSettings
+from vdet.config.scene import LensSettings
 from vdet.config.schema import LaneSettings, OutputSettings, Settings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.model import save_model

@@ -16,8 +16,7 @@ from browser import CONTROL, DELETE, ENTER, ESCAPE, SHIFT, Browser, browser, dow
 from pages.html import Elements
 from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, counts, frames, settings_for, through
 from vdet.boxes import Box
-from vdet.config.document import parse_document
-from vdet.config.loading import given_values, load_settings
+from vdet.config.loading import given_values, load_settings, parse_document
 from vdet.config.schema import Settings
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.ground import fit_ground

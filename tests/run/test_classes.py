@@ -10,8 +10,8 @@ from run.red_runs import outputs
 from running import names, rows_of
 from vdet.boxes import Boxes
 from vdet.config.loading import load_settings
+from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.errors import ConfigError
 from vdet.media import Picture
 from vdet.run.loop import Parts

@@ -4,7 +4,7 @@ import pytest
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, drive
 from run.red_runs import follow
-from vdet.config.camera import CameraSettings, LensSettings
+from vdet.config.scene import CameraSettings, LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import Undistorter
 

@@ -3,8 +3,8 @@ import pytest
 from boxing import moved_to
 from seed import SEED
 from vdet.boxes import NO_BOXES, Box, Boxes
+from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.schema import Settings
-from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.track.factory import InterpolatingTracker, make_tracker
 from vdet.track.motion.tracker import MotionTracker

@@ -8,9 +8,9 @@ import pytest
 
 import vdet
 from vdet.boxes import NO_BOXES, Box, Boxes
+from vdet.config.kinds import RulesTrackerSettings
+from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import MotionTrackerSettings, Settings
-from vdet.config.shapes import LineSettings, TrafficSettings
-from vdet.config.tracker import RulesTrackerSettings
 from vdet.labels.formats import TrackWriter, last_classes, track_formats
 from vdet.labels.label import SourceVideo
 from vdet.media import Picture

@@ -6,9 +6,8 @@ from itertools import groupby, pairwise
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.config.camera import CameraSettings
+from vdet.config.scene import CameraSettings, LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import LineSettings, TrafficSettings, ZoneSettings
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.counting import count_frames

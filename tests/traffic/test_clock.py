@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from clips import write_clip
 from conftest import Run
-from vdet.config.camera import CameraSettings, ClockSettings, parse_date_time
+from vdet.config.scene import CameraSettings, ClockSettings, parse_date_time
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import ConfigError
 from vdet.labels.label import SavedTracks

@@ -13,7 +13,7 @@ import pytest
 
 from running import rows_of
 from traffic.scenes import ZONE, counts, frames, joined, numbered, through
-from vdet.config.shapes import LineSettings
+from vdet.config.scene import LineSettings
 from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock

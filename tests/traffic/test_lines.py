@@ -5,7 +5,7 @@ import random
 import pytest
 
 from traffic.scenes import CAR_HEIGHT, HEIGHT, LINE, WIDTH, events, feet, frames, through, ways
-from vdet.config.shapes import LineSettings
+from vdet.config.scene import LineSettings
 
 ABOVE, BELOW = (600.0, 385.0), (600.0, 415.0)  # a quarter of a box from the line
 

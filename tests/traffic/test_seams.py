@@ -8,9 +8,8 @@ from pathlib import Path as File
 import pytest
 
 from traffic.scenes import CAR_HEIGHT, Path, settings_for, through, track
-from vdet.config.camera import ClockSettings
+from vdet.config.scene import ClockSettings, LineSettings, ZoneSettings
 from vdet.config.schema import InputSettings
-from vdet.config.shapes import LineSettings, ZoneSettings
 from vdet.errors import TruthError
 from vdet.labels.formats import TrackWriter
 from vdet.labels.label import SourceVideo

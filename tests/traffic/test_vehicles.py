@@ -19,7 +19,7 @@ from traffic.scenes import (
     track,
     ways,
 )
-from vdet.config.shapes import LineSettings
+from vdet.config.scene import LineSettings
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks
 from vdet.traffic.linking import link_tracks

@@ -3,7 +3,7 @@
 import pytest
 
 from traffic.scenes import LINE, Path, counts, frames, through
-from vdet.config.shapes import LineSettings
+from vdet.config.scene import LineSettings
 from vdet.findings import Finding
 
 DOWN = through((1, 600, 300), (5, 600, 500))

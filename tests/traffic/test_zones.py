@@ -16,7 +16,7 @@ from traffic.scenes import (
     through,
     ways,
 )
-from vdet.config.shapes import ZoneSettings
+from vdet.config.scene import ZoneSettings
 from vdet.traffic.counter import VehicleCounter
 
 ACROSS = through((0, 200, 400), (8, 1000, 400))  # 100 pixels a second; in from 2 s to 6 s

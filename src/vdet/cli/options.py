@@ -16,7 +16,7 @@ from vdet.files import FileIds, OutputFiles, json_text, output_errors, print_now
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
-    from vdet.config.document import Document
+    from vdet.config.loading import Document
     from vdet.config.schema import Settings
     from vdet.evaluate.report import Report
 
@@ -216,8 +216,7 @@ class SettingsSource:
             from vdet.config.schema import Settings
 
             return Settings()  # without YAML
-        from vdet.config.document import parse_assignment
-        from vdet.config.loading import load_settings
+        from vdet.config.loading import load_settings, parse_assignment
 
         changes = [parse_assignment(text, "--set") for text in self.changes]
         return load_settings(self.files, options=[*changes, *self.options], detector=detector)
@@ -240,7 +239,7 @@ def settings_options(**keys: str) -> Callable[[Function], Function]:
             for name, key in keys.items():
                 value = values.pop(name)
                 if value is not None and value is not False and value != ():
-                    from vdet.config.document import given
+                    from vdet.config.loading import given
 
                     option = "--class" if name == "classes" else f"--{name}"
                     plain = str(value) if isinstance(value, Path) else value

@@ -14,8 +14,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
 from vdet.config.loading import shapes_in
+from vdet.config.scene import FRACTIONS, Shape
 from vdet.config.schema import Section, Settings
-from vdet.config.shapes import FRACTIONS, Shape
 
 HEADING = "# vdet settings. `vdet config` prints the effective ones."
 WIDTH = 100

@@ -16,12 +16,24 @@ from pydantic import (
     model_validator,
 )
 
-from vdet.config.camera import CameraSettings, parse_date_time
-from vdet.config.detector import ClassNames, DetectorSettings, NetworkSettings, SvmSettings
-from vdet.config.kinds import with_kind
+from vdet.config.kinds import (
+    ClassNames,
+    DetectorSettings,
+    MotionTrackerSettings,
+    NetworkSettings,
+    SvmSettings,
+    TrackerSettings,
+    with_kind,
+)
+from vdet.config.scene import (
+    CameraSettings,
+    FramePoint,
+    RegionList,
+    Shape,
+    TrafficSettings,
+    parse_date_time,
+)
 from vdet.config.section import Ratio, Section
-from vdet.config.shapes import FramePoint, RegionList, Shape, TrafficSettings
-from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
 from vdet.errors import ConfigError
 
 Metres = Annotated[float, Field(gt=0, le=200)]

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.config.classes import UNKNOWN
-from vdet.config.document import Document
-from vdet.config.loading import validated
+from vdet.config.loading import Document, validated
 from vdet.errors import TruthError
 from vdet.evaluate.output import figure, table
 from vdet.traffic.correcting import judge

@@ -16,8 +16,8 @@ import pydantic
 from pydantic import AwareDatetime, Field, TypeAdapter
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.camera import EARLIEST, LATEST
 from vdet.config.classes import standard_class
+from vdet.config.scene import EARLIEST, LATEST
 from vdet.errors import TruthError
 from vdet.findings import Finding
 from vdet.track.track import FrameTracks, Track

@@ -20,7 +20,7 @@ from pydantic import FailFast, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from vdet.boxes import Box
-from vdet.config.camera import parse_date_time
+from vdet.config.scene import parse_date_time
 from vdet.errors import TruthError
 from vdet.files import json_line
 from vdet.findings import Finding

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.config.document import parse_document
+from vdet.config.loading import parse_document
 from vdet.errors import ConfigError, ImageError, TruthError
 from vdet.files import is_hidden
 from vdet.labels.images import LabelledImage

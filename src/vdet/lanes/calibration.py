@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from vdet.boxes import Float32Array, Image
-from vdet.config.camera import LensSettings
+from vdet.config.scene import LensSettings
 from vdet.errors import ImageError
 from vdet.media.images import read_image
 

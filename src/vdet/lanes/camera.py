@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from vdet.boxes import Box, Float64Array, Image
-from vdet.config.camera import LensSettings
+from vdet.config.scene import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.files import write_whole
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float64Array
-from vdet.config.camera import CameraSettings
+from vdet.config.scene import CameraSettings
 from vdet.errors import ConfigError
 from vdet.lanes.camera import Undistorter
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float64Array, Image
-from vdet.config.camera import LensSettings
+from vdet.config.scene import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.draw.boxes import Color, Surface, draw_label, draw_lines, line_width, shade
 from vdet.lanes.camera import Maps, TopView, Undistorter, warped

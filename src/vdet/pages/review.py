@@ -10,7 +10,7 @@ from zlib import crc32
 from markupsafe import Markup
 
 from vdet.config.classes import STANDARD_CLASSES
-from vdet.config.shapes import TrafficSettings
+from vdet.config.scene import TrafficSettings
 from vdet.files import valid_text
 from vdet.findings import Finding
 from vdet.media import VideoInfo

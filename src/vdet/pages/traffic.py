@@ -13,8 +13,8 @@ from types import MappingProxyType
 import numpy as np
 
 from vdet.boxes import Image
+from vdet.config.scene import TrafficSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import TrafficSettings
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
 from vdet.errors import ConfigError, clock_text

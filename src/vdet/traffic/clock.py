@@ -11,7 +11,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vdet.config.camera import parse_date_time
+from vdet.config.scene import parse_date_time
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, clock_text
 from vdet.media.frame import Tags

@@ -10,10 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import AwareDatetime, Field, PrivateAttr, model_validator
 
-from vdet.config.document import Document, read_document
-from vdet.config.loading import validated
+from vdet.config.loading import Document, read_document, validated
+from vdet.config.scene import LineSettings, Name, Shape, Size, TrafficSettings, ZoneSettings
 from vdet.config.section import Section
-from vdet.config.shapes import LineSettings, Name, Shape, Size, TrafficSettings, ZoneSettings
 from vdet.errors import ConfigError
 from vdet.files import read_whole
 from vdet.labels.label import SourceVideo, may_be_same

@@ -11,7 +11,7 @@ from itertools import accumulate, chain, pairwise, product
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from vdet.config.classes import UNKNOWN
-from vdet.config.shapes import NOWHERE
+from vdet.config.scene import NOWHERE
 from vdet.errors import ArgumentError, needing, quantity
 from vdet.findings import Finding, warnings_in
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span

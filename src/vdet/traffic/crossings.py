@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from vdet.boxes import EDGE, BoolArray, Float64Array
-from vdet.config.shapes import ZONE_DIRECTIONS, TrafficSettings
+from vdet.config.scene import ZONE_DIRECTIONS, TrafficSettings
 from vdet.polygons import Point, Segment, meeting, side_of, sides
 from vdet.traffic.linking import DURATION_DIGITS, VehiclePath
 

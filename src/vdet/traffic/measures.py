@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from vdet.config.shapes import Approach
+from vdet.config.scene import Approach
 from vdet.traffic.clock import ClockTime, Interval
 
 QUARTER = 900

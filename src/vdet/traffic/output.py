@@ -9,7 +9,7 @@ from dataclasses import asdict, astuple, fields
 from pathlib import Path
 from typing import Any
 
-from vdet.config.shapes import NOWHERE
+from vdet.config.scene import NOWHERE
 from vdet.traffic import counts as tables
 from vdet.traffic.counts import (
     Corrected,

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from vdet.config.classes import UNKNOWN, standard_class
+from vdet.config.scene import Name
 from vdet.config.section import Section
-from vdet.config.shapes import Name
 from vdet.labels.label import NO_ID
 from vdet.traffic.counts import Event
 

@@ -8,8 +8,8 @@ from itertools import chain, product
 import numpy as np
 
 from vdet.boxes import Image
+from vdet.config.scene import NOWHERE
 from vdet.config.schema import Settings
-from vdet.config.shapes import NOWHERE
 from vdet.errors import ConfigError, quantity
 from vdet.traffic import counts as tables
 from vdet.traffic import measures

@@ -10,7 +10,7 @@ from benchmarks.patch_search import PatchSearch
 from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
-from vdet.config.detector import FeatureSettings, WindowSettings
+from vdet.config.kinds import FeatureSettings, WindowSettings
 from vdet.detect.svm.features import FeatureExtractor, resize
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.search import DenseSearch, FramePyramid

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Image
-from vdet.config.detector import FeatureSettings, HogSettings
+from vdet.config.kinds import FeatureSettings, HogSettings
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.search import DenseSearch, FramePyramid

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Box
-from vdet.config.detector import HeatSettings, WindowSettings
+from vdet.config.kinds import HeatSettings, WindowSettings
 from vdet.detect.svm.heat import Heat, find_regions, sum_heat
 from vdet.detect.svm.windows import Windows, band_grid
 

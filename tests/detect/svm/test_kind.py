@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from red_cars import red_finder
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import SvmSettings
 from vdet.detect.factory import load_detector, model_file

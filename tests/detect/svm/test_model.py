@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from vdet.config.detector import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.kinds import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.model import BoxRegression, LinearModel, load_model, save_model
 from vdet.errors import ModelError
 

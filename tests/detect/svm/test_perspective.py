@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.config.detector import FeatureSettings, PerspectiveSettings
+from vdet.config.kinds import FeatureSettings, PerspectiveSettings
 from vdet.detect.svm.windows import WindowGrid, perspective_grids
 
 FEATURES = FeatureSettings()

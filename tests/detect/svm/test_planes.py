@@ -5,7 +5,7 @@ import numpy as np
 from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
 from vdet.boxes import Image
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmDetector
 from vdet.media import Picture, Planes

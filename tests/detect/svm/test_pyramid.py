@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.detect.svm.features import resize, split
 from vdet.detect.svm.search import FramePyramid
 from vdet.detect.svm.windows import FrameStrip

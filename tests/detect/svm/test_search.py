@@ -5,7 +5,7 @@ import pytest
 
 from seed import SEED
 from vdet.boxes import Image
-from vdet.config.detector import (
+from vdet.config.kinds import (
     FeatureSettings,
     HistogramSettings,
     PerspectiveSettings,

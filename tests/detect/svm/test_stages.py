@@ -5,7 +5,7 @@ import pytest
 
 from red_cars import CAR, SCALE, SETTINGS, red_finder, road
 from vdet.boxes import Image
-from vdet.config.detector import WindowSettings
+from vdet.config.kinds import WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmModel, blend_heat

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vdet.boxes import Int32Array
-from vdet.config.detector import WindowSettings
+from vdet.config.kinds import WindowSettings
 from vdet.detect.svm.windows import WindowGrid, Windows, band_grid
 
 ROWS = 2000  # of a frame that is higher than all bands here

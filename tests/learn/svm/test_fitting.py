@@ -13,7 +13,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import LinearSVC
 
 from vdet.boxes import BoolArray, Float32Array
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError

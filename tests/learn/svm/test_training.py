@@ -9,7 +9,7 @@ import pytest
 
 import vdet
 from vdet.boxes import Image
-from vdet.config.detector import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.kinds import FeatureSettings, HistogramSettings, HogSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import load_model, save_model

@@ -10,8 +10,8 @@ from red_cars import SETTINGS
 from run.red_runs import outputs, read, result_of, run_red, write
 from running import rows_of
 from vdet.boxes import Box
+from vdet.config.scene import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
-from vdet.config.shapes import LineSettings, TrafficSettings, ZoneSettings
 from vdet.errors import OutputError
 from vdet.pages.render import PAGE_NAME
 from vdet.run.sinks import Output

@@ -11,7 +11,7 @@ import pytest
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box, Image
-from vdet.config.camera import LensSettings
+from vdet.config.scene import LensSettings
 from vdet.config.schema import DrawSettings, LaneSettings, Settings
 from vdet.draw.boxes import color_of, draw_box
 from vdet.lanes.road import Lane, Road, RoadFinder

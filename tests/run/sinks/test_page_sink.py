@@ -14,8 +14,8 @@ from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
 from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
 from vdet.boxes import Image
+from vdet.config.scene import RegionSettings
 from vdet.config.schema import OutputSettings
-from vdet.config.shapes import RegionSettings
 from vdet.media.images import decode_image
 from vdet.run.sinks import Output
 from vdet.run.video import Run

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Image
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.media.images import to_ycrcb
 
 Channels = tuple[Image, Image, Image]

@@ -31,7 +31,7 @@ from vdet.boxes import (
     from_xywh,
     iou_matrix,
 )
-from vdet.config.detector import HeatSettings
+from vdet.config.kinds import HeatSettings
 from vdet.config.section import REFERENCE_HEIGHT
 from vdet.detect.svm.windows import Windows
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.errors import ModelError
 from vdet.files import read_whole, staged
 

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array, Image
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.detect.svm.features import Channels, halve, hog_descriptors, resize, split
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, IndexArray, WindowGrid

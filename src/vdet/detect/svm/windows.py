@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Int32Array
-from vdet.config.detector import FeatureSettings, PerspectiveSettings, WindowSettings
+from vdet.config.kinds import FeatureSettings, PerspectiveSettings, WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float32Array, Image
-from vdet.config.detector import FeatureSettings
+from vdet.config.kinds import FeatureSettings
 from vdet.detect.svm.features import FeatureExtractor, resize
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import NO_SIDES, PatchFile, read_patches

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Image
-from vdet.config.tracker import RulesTrackerSettings
+from vdet.config.kinds import RulesTrackerSettings
 from vdet.polygons import Point
 from vdet.track.votes import ClassVotes, vote_weight
 

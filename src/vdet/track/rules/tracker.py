@@ -36,8 +36,8 @@ from dataclasses import replace
 from itertools import combinations, count
 
 from vdet.boxes import Boxes, Image
+from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.config.tracker import RulesTrackerSettings
 from vdet.errors import ArgumentError
 from vdet.media import Picture
 from vdet.track.rules.car import Car, Region, combine
