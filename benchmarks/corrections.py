@@ -18,12 +18,11 @@ import numpy as np
 from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
 from vdet.boxes import Box
 from vdet.config.schema import Settings
+from vdet.review.correcting import apply_corrections
+from vdet.review.corrections import Corrections, ReviewedEvent, paired
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.correcting import apply_corrections
-from vdet.traffic.corrections import Corrections
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import Counts, Event
-from vdet.traffic.reviewed import ReviewedEvent, paired
 
 CLASSES = ("car", "truck", "bus", "motorcycle")
 MISSING, DOUBLED, RENAMED = 0.05, 0.03, 0.10

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vdet.traffic.estimate import ALL, CountError, Estimate, VehicleGroup, estimate
-from vdet.traffic.sample import draw_spans
+from vdet.review.estimate import CountError, draw_spans, estimate
+from vdet.traffic.counts import ALL, Estimate, VehicleGroup
 
 CLASSES = {"car": 0.85, "truck": 0.1, "bus": 0.05}
 

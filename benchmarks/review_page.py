@@ -27,7 +27,10 @@ from vdet.config.schema import Settings
 from vdet.files import OutputFiles
 from vdet.findings import Findings
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.pages.review import PAGE_NAME
+from vdet.pages.render import REVIEW_NAME
+from vdet.review.correcting import apply_corrections
+from vdet.review.corrections import Corrections
+from vdet.review.strips import BandPassage, Passages, bands_of
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
@@ -46,11 +49,8 @@ from vdet.synthetic.scene import (
 from vdet.synthetic.truth import TrueBox, true_boxes
 from vdet.synthetic.vehicle import draw_vehicle
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.correcting import apply_corrections
-from vdet.traffic.corrections import Corrections
 from vdet.traffic.counts import Counts
 from vdet.traffic.live import LiveTraffic
-from vdet.traffic.strips import BandPassage, Passages, bands_of
 
 SECONDS, VEHICLES, RATE = 3600, 600, Fraction(25, 2)
 EACH = VEHICLES // 20  # missed, false, and of a wrong class
@@ -302,7 +302,7 @@ def main() -> None:
         folder, begin = Path(name), time.perf_counter()
         survey = write_page(road, folder / "review")
         counts, true, errors = survey.counts, survey.true, survey.errors(road)
-        page = folder / "review" / PAGE_NAME
+        page = folder / "review" / REVIEW_NAME
         print(f"{len(counts.events)} counted, {len(true.events)} true, {len(errors)} errors")
         print(f"page: {page.stat().st_size / 1e6:.1f} MB, {time.perf_counter() - begin:.0f} s")
         values = json.dumps([error.values() for error in errors])

@@ -17,12 +17,12 @@ import numpy as np
 from benchmarks.drawn_traffic import as_planes
 from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
 from vdet.boxes import Image
+from vdet.review.strips import Band, BandPassage, Passages, bands_of, sampling_of
+from vdet.review.traces import TraceSearch
 from vdet.synthetic.render import frames
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Trace
 from vdet.traffic.crossings import lines_and_zones
-from vdet.traffic.strips import Band, BandPassage, Passages, bands_of, sampling_of
-from vdet.traffic.traces import TraceSearch
 
 MISSED = 0.1
 SEEDS = range(5)

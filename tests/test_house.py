@@ -17,8 +17,8 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 ROOMS = (
     "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "run",
-    "pages", "conditions", "traffic", "labels", "lanes", "track", "detect", "synthetic", "draw",
-    "regions", "media", "config", "plugins", "workers", "files", "polygons", "boxes",
+    "review", "pages", "conditions", "traffic", "labels", "lanes", "track", "detect", "synthetic",
+    "draw", "regions", "media", "config", "plugins", "workers", "files", "polygons", "boxes",
     "findings", "errors", "progress", "__init__", "version",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""

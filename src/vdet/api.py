@@ -42,6 +42,8 @@ from vdet.labels.label import Label, SavedTracks, SourceVideo
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
+from vdet.review.correcting import all_classes, apply_corrections
+from vdet.review.corrections import Corrections
 from vdet.run.images import ImageJob, ImageSearch, run_images
 from vdet.run.inputs import input_files
 from vdet.run.loop import Parts
@@ -52,8 +54,6 @@ from vdet.run.steps import Step
 from vdet.run.video import Results, Run, RunTotals, run_video
 from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
-from vdet.traffic.correcting import all_classes, apply_corrections
-from vdet.traffic.corrections import Corrections
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord

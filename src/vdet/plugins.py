@@ -41,8 +41,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         for module, names in {
             "drawn": ("video", "image"),
             "data": ("tracks", "json", "labels", "vehicles", "counts", "flows", "conditions"),
-            "folders": ("stages", "crops", "clips", "page"),
-            "review": ("review",),
+            "folders": ("stages", "crops", "clips", "page", "review"),
         }.items()
         for name in names
     },

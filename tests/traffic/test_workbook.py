@@ -15,8 +15,7 @@ from vdet.config.schema import Settings
 from vdet.findings import Finding
 from vdet.pages.traffic import page_table
 from vdet.traffic.clock import Clock
-from vdet.traffic.counts import Corrected, Correction, Counts, Event
-from vdet.traffic.estimate import Estimate, VehicleGroup
+from vdet.traffic.counts import Corrected, Correction, Counts, Estimate, Event, VehicleGroup
 from vdet.traffic.measures import HEAVY_NAMED, movement
 from vdet.traffic.survey import Survey
 from vdet.traffic.workbook import Sheet, SheetTable, write_workbook

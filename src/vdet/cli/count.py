@@ -80,9 +80,9 @@ def count(
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
     from vdet.pages.traffic import survey_image
+    from vdet.review.correcting import all_classes, apply_corrections
+    from vdet.review.corrections import Corrections
     from vdet.run.sinks.protocol import check_sinks
-    from vdet.traffic.correcting import all_classes, apply_corrections
-    from vdet.traffic.corrections import Corrections
     from vdet.traffic.counting import count_files
     from vdet.traffic.survey import Survey
 

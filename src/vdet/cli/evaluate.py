@@ -148,8 +148,8 @@ def counts(events: Path, truth: Path, results: ResultFiles) -> None:
       vdet eval counts counts.csv corrections.yaml
     """
     from vdet.evaluate.counts import count_lines, score_counts
+    from vdet.review.corrections import Corrections
     from vdet.run.inputs import input_files
-    from vdet.traffic.corrections import Corrections
 
     results.check(input_files(events, truth))
     scores = score_counts(events, Corrections.read(truth))

@@ -10,10 +10,9 @@ from vdet.config.classes import UNKNOWN
 from vdet.config.loading import Document, validated
 from vdet.errors import TruthError
 from vdet.evaluate.output import figure, table
-from vdet.traffic.correcting import judge
-from vdet.traffic.corrections import Corrections
+from vdet.review.correcting import judge
+from vdet.review.corrections import Corrections, ReviewedEvent
 from vdet.traffic.counts import Counts, Event, class_of
-from vdet.traffic.reviewed import ReviewedEvent
 from vdet.traffic.tables import VIDEO, read_table
 
 _COLUMNS = "time", "name", "direction", "class", "id"

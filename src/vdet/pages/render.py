@@ -17,7 +17,7 @@ from vdet.version import __version__
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings and rows of text."""
-PAGE_NAME = "page.html"
+PAGE_NAME, REVIEW_NAME = "page.html", "review.html"
 """File name of a page in its folder."""
 TEMPLATES = Path(__file__).parent / "templates"
 _QUALITY = 84  # of JPEG pictures

@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
@@ -33,6 +33,10 @@ from vdet.traffic.counts import Corrected, Counts
 from vdet.traffic.live import LiveTraffic, source_video
 from vdet.traffic.records import VehicleRecord
 from vdet.workers import core_count
+
+if TYPE_CHECKING:
+    from vdet.labels.label import SourceVideo
+    from vdet.review.corrections import Corrections
 
 log = logging.getLogger("vdet")
 
@@ -175,12 +179,15 @@ class Results(Iterator[FrameResult]):
     ----------
     reader, traffic, stage_images
         The open video, its counts, speeds and records so far, and what draws stages.
+    corrections
+        What reviewers say of the counts.
     facts
         Results of steps about the whole video, by name; empty before the last frame.
     """
 
     reader: VideoReader
     traffic: LiveTraffic | None = None
+    corrections: "Corrections | None" = None
     stage_images: StageImages = staticmethod(lambda *_: {})
 
     def __init__(
@@ -235,7 +242,8 @@ class Results(Iterator[FrameResult]):
                 results = self._searched(model, frames)
             elif tracks:
                 results = self._saved(tracks, frames)
-            self.traffic = traffic = live_traffic(run, reader.info)
+            self.traffic = traffic = _live_traffic(run, reader.info)
+            self.corrections = _corrections(run, traffic.source)
             yield None
             with closing(results):
                 for result in results:
@@ -244,6 +252,10 @@ class Results(Iterator[FrameResult]):
                     yield result.of_classes(settings.classes)
             if self._with_traffic:
                 traffic.end(findings_in(self.facts))
+                if self.corrections and (counted := traffic.counted):
+                    from vdet.review.correcting import correct  # most runs load nothing of it
+
+                    traffic.revise(correct({"": counted}, {"": self.corrections}, settings)[""])
                 if counts := traffic.counts():
                     findings = replace(findings_in(self.facts), items=counts.findings)
                     self.facts[FINDINGS] = findings
@@ -279,18 +291,28 @@ class Results(Iterator[FrameResult]):
         self.facts[FINDINGS] = Findings(saved.findings)
 
 
-def live_traffic(run: Run, info: VideoInfo) -> LiveTraffic:
-    """Return what counts in the frames of a run. Raises `ConfigError` if corrections do not fit."""
+def _live_traffic(run: Run, info: VideoInfo) -> LiveTraffic:
+    """Return what counts in the frames of a run."""
     clock = find_clock(run.source, run.settings, tags=info.tags, length=info.duration)
     source = source_video(info, clock) if run.settings.traffic else None
-    corrections = None
-    if run.corrections:  # most runs have none, and load nothing for them
-        from vdet.traffic.corrections import Corrections, by_video
+    return LiveTraffic(
+        run.settings,
+        info.width,
+        info.height,
+        clock,
+        source=source,
+        with_all_classes=bool(run.corrections),
+    )
 
-        reviews = map(Corrections.read, run.corrections)
-        corrections = by_video(reviews, {"": source}, run.settings.traffic)[""]
-    size = info.width, info.height
-    return LiveTraffic(run.settings, *size, clock, source=source, corrections=corrections)
+
+def _corrections(run: Run, source: "SourceVideo | None") -> "Corrections | None":
+    """Return the corrections of a run, merged. Raises `ConfigError` if they do not fit."""
+    if not run.corrections:
+        return None
+    from vdet.review.corrections import Corrections, by_video  # most runs load nothing of it
+
+    reviews = map(Corrections.read, run.corrections)
+    return by_video(reviews, {"": source}, run.settings.traffic)[""]
 
 
 @contextmanager
@@ -375,6 +397,7 @@ def write_outputs(
             at=run.at,
             outputs=run.outputs,
             traffic=traffic,
+            corrections=results.corrections,
             facts=results.facts,
             stage_images=results.stage_images,
         )

@@ -16,7 +16,6 @@ from vdet.errors import ArgumentError, needing, quantity
 from vdet.findings import Finding, warnings_in
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
-from vdet.traffic.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,6 +180,44 @@ class ZoneRow:
     max_stay: float | None
     observed: float
     is_part: bool
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleGroup:
+    """Vehicles in a direction of a line or zone, vehicles of a class, or all: `ALL`."""
+
+    name: str | None = None
+    direction: str | None = None
+    class_name: str | None = None
+
+
+ALL = VehicleGroup()
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """The true number of vehicles of a group.
+
+    Attributes
+    ----------
+    counted, corrected
+        Number that was counted in all spans, and with all known errors corrected.
+    true
+        Estimate of the true number.
+    low, high
+        Its interval of 95 %.
+    minutes_to_precision
+        How many more drawn spans are expected to bring half of the width of the interval to 2 % of
+        the true number; 0 if it is that narrow.
+    """
+
+    group: VehicleGroup
+    counted: int
+    corrected: int
+    true: float
+    low: float
+    high: float
+    minutes_to_precision: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Records, counts and speeds of a video while it is processed."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,13 +13,12 @@ from vdet.media import VideoInfo
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import Counts, Trace
+from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord, VehicleRecords
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 if TYPE_CHECKING:
     from vdet.labels.label import SourceVideo
-    from vdet.traffic.corrections import Corrections
 
 
 def source_video(video: VideoInfo, clock: Clock | None) -> "SourceVideo":
@@ -49,10 +48,10 @@ class LiveTraffic:
         None without ground points.
     vehicles
         A record of each vehicle of the selected classes, by id; empty before `end`.
-    corrections
-        What reviewers say of the counts.
+    source
+        What is known of the video.
     counted
-        The counts before corrections; None before `end`.
+        The counts before they were revised; None before `end`.
 
     Raises
     ------
@@ -68,16 +67,16 @@ class LiveTraffic:
         clock: Clock | None = None,
         *,
         source: "SourceVideo | None" = None,
-        corrections: "Corrections | None" = None,
+        with_all_classes: bool = False,
     ) -> None:
-        self.clock = clock
-        self.corrections = corrections
-        self._source, self._settings = source, settings
+        self.clock, self.source = clock, source
+        self._settings = settings
         self._records = VehicleRecords(width)
+        self._ended: Sequence[VehicleRecord] = ()
         self._final: Counts | None = None
         self.counted: Counts | None = None
         self.vehicles: tuple[VehicleRecord, ...] = ()
-        if corrections:  # they may be of any class; the selection follows
+        if with_all_classes:  # until the counts are revised
             settings = settings.model_copy(update={"classes": ()})
         self.counter = None
         if settings.traffic:
@@ -98,48 +97,43 @@ class LiveTraffic:
         """Return all counts so far, with known speeds."""
         if self._final or self.counter is None:
             return self._final
-        counts = replace(self.counter.counts(), clock=self.clock, source=self._source)
+        counts = replace(self.counter.counts(), clock=self.clock, source=self.source)
         return with_speeds(counts, self.speeds)
-
-    def add_traces(self, traces: Sequence[Trace]) -> None:
-        """Add what passed without a track to the counts, with its findings, after `end`."""
-        from vdet.traffic.traces import trace_findings  # most runs have no strips
-
-        if self._final:
-            counts = replace(self._final, traces=tuple(traces))
-            found = without(trace_findings(counts), self._settings.conditions.ignore)
-            self._final = replace(counts, findings=counts.findings + found)
 
     def end(self, findings: Findings) -> None:
         """Make records and counts, after the last frame.
 
         `findings` are about the tracks.
         """
-        records = self._records.end(self.speeds, is_still=findings.is_still)
+        self._ended = self._records.end(self.speeds, is_still=findings.is_still)
         if counts := self.counts():
-            counts = replace(counts, findings=(*findings.items, *counts.findings))
-            self.counted = counts
-            if self.corrections:
-                from vdet.traffic.correcting import correct  # most runs load nothing of it
+            self.counted = replace(counts, findings=(*findings.items, *counts.findings))
+            self.revise(self.counted)
+        else:
+            self._choose()
 
-                counts = correct({"": counts}, {"": self.corrections}, self._settings)[""]
-                _correct(records, self.counted, counts)
-            ignored = self._settings.conditions.ignore
-            self._final = replace(counts, findings=without(counts.findings, ignored))
+    def revise(self, counts: Counts) -> None:
+        """Replace the counts after `end`.
+
+        Vehicles get the class that was corrected in their events.
+        """
+        assert self.counted
+        ignored = self._settings.conditions.ignore
+        self._final = replace(counts, findings=without(counts.findings, ignored))
+        if counts.corrected:
+            before = {event.id: event.class_name for event in self.counted.events}
+            changed = {
+                event.id: event.class_name
+                for event in counts.events
+                if event.class_name != before.get(event.id)
+            }
+            for record in self._ended:
+                if record.id in changed:
+                    record.class_name = changed[record.id]
+                    record.corrected = counts.corrected.files
+        self._choose()
+
+    def _choose(self) -> None:
         classes = self._settings.classes
-        chosen = (record for record in records if is_chosen(record.class_name, classes))
+        chosen = (record for record in self._ended if is_chosen(record.class_name, classes))
         self.vehicles = tuple(chosen)
-
-
-def _correct(records: Iterable[VehicleRecord], counts: Counts, corrected: Counts) -> None:
-    """Give vehicles the class that was corrected in their events."""
-    classes = {event.id: event.class_name for event in counts.events}
-    changed = {
-        event.id: event.class_name
-        for event in corrected.events
-        if event.class_name != classes.get(event.id)
-    }
-    for record in records:
-        if record.id in changed and corrected.corrected:
-            record.class_name = changed[record.id]
-            record.corrected = corrected.corrected.files

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime, timedelta
 from itertools import chain, product
+from math import hypot
 
 import numpy as np
 
@@ -14,8 +15,16 @@ from vdet.errors import ConfigError, quantity
 from vdet.traffic import counts as tables
 from vdet.traffic import measures
 from vdet.traffic.clock import SEAM, ClockTime, Interval, Intervals
-from vdet.traffic.counts import Counts, GroupedEvent, Key, Tally, ZoneRow, class_of, names_in
-from vdet.traffic.estimate import Estimate, sums
+from vdet.traffic.counts import (
+    Counts,
+    Estimate,
+    GroupedEvent,
+    Key,
+    Tally,
+    ZoneRow,
+    class_of,
+    names_in,
+)
 from vdet.traffic.workbook import Cell, Sheet, SheetTable
 from vdet.version import __version__
 
@@ -168,7 +177,7 @@ class Survey:
             for event in (counts.corrected.counted if counts.corrected else counts.events)
         )
         is_known = len(estimates) == len(every)
-        limits = map(round, sums(estimates)) if is_known else [None] * len(_ESTIMATED)
+        limits = map(round, _sums(estimates)) if is_known else [None] * len(_ESTIMATED)
         return [before, corrected, *limits]
 
     def flows(self) -> SheetTable:
@@ -368,3 +377,10 @@ def _seam(before: Interval | None, file: Interval) -> str | None:
     if abs(gap) <= SEAM:
         return "continues"
     return f"gap of {gap:.0f} s" if gap > 0 else f"begins {-gap:.0f} s before its end"
+
+
+def _sums(estimates: Sequence[Estimate]) -> tuple[float, float, float]:
+    """Return the true number in several videos, and its interval: their errors are independent."""
+    true = sum(item.true for item in estimates)
+    below = hypot(*(item.true - item.low for item in estimates))
+    return true, true - below, true + hypot(*(item.high - item.true for item in estimates))

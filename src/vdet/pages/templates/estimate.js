@@ -1,5 +1,5 @@
 "use strict";
-// How right a count is. Some spans are drawn in strata of similar traffic (vdet.traffic.sample), and checked. The true
+// How right a count is. Some spans are drawn in strata of similar traffic (vdet.review.estimate), and checked. The true
 // count is what was counted, plus the vehicles missed, minus those counted wrongly: known in checked spans, estimated in
 // the unchecked. Both kinds of errors are estimated by the combined ratio estimator of stratified sampling (Cochran,
 // Sampling Techniques, 3rd ed., 1977, chapters 5 and 6), in proportion to the vehicles counted in a span.

@@ -1,11 +1,12 @@
-"""The sinks that write a folder: `stages`, `crops`, `clips` and `page`."""
+"""The sinks that write a folder: `stages`, `crops`, `clips`, `page` and `review`."""
 
 import logging
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
@@ -18,12 +19,11 @@ from vdet.media.cutting import copied_suffix, copy_part, encode_part
 from vdet.media.demux import is_pipe
 from vdet.media.images import encode_image, is_image_name
 from vdet.media.writer import is_marked
-from vdet.pages.batch import write_index
-from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
-from vdet.pages.review import PAGE_NAME as REVIEW_NAME
+from vdet.pages.batch import write_index, write_reviews
+from vdet.pages.render import PAGE_NAME, REVIEW_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import Regions
-from vdet.run.result import FrameResult, findings_in
+from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.clock import Clock, Span, extend
@@ -325,4 +325,55 @@ def _state(path: Path) -> tuple[int, int, int, int] | None:
 
 CLIPS = SinkKind(
     ClipSink, what="clips", folder_pattern="clip-*.*", takes="videos", may_replace=_may_replace
+)
+
+
+class ReviewSink(BaseSink):
+    """Writes the page on which the counts are checked."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        if not context.settings.traffic:
+            raise OutputError(f"{path}: no lines or zones to review; add them to the settings")
+        from vdet.review.page import ReviewRecorder  # most runs load nothing of it
+
+        counter = self.traffic.counter
+        assert counter  # the settings have lines or zones
+        self._file = context.files.stage_folder(path) / REVIEW_NAME
+        borders = counter.borders
+        self._recorder = ReviewRecorder(self.video, context.settings, borders, context.crops)
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        with self._recorder:
+            super().__exit__(kind)
+
+    def write(self, result: FrameResult) -> None:
+        """Add a frame to all strips."""
+        frame = replace(result.frame_tracks, tracks=(*result.tracks, *result.unselected))
+        self._recorder.add(frame, result.frame_tracks, result.frame.picture)
+
+    def finish(self) -> None:
+        """Write the page, and add the traces to the counts, and the findings about them."""
+        from vdet.review.traces import with_traces
+
+        traffic, facts = self.traffic, self.context.facts
+        counts = traffic.counts()
+        assert counts
+        traffic.revise(with_traces(counts, self._recorder.end()))
+        counts, counted = traffic.counts(), traffic.counted
+        assert counts
+        assert counted
+        facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
+        facts_of_page = self._recorder.write(self._file, counted, counts, self.context.corrections)
+        self.summary = {"page": f"{self.path.name}/{REVIEW_NAME}", **facts_of_page}
+
+
+_LIST = BatchTotal("reviews", write_reviews, ".html", of_failed=lambda error: {"error": error})
+REVIEW = SinkKind(
+    ReviewSink,
+    what="reviews",
+    folder_pattern=REVIEW_NAME,
+    takes="videos",
+    total=_LIST,
+    finish_order=-1,
 )

@@ -19,6 +19,7 @@ from vdet.run.result import Fact, FrameResult
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:  # an image needs no traffic: a tenth of the time of `detect-image`
+    from vdet.review.corrections import Corrections
     from vdet.run.sinks.poster import Poster
     from vdet.traffic.live import LiveTraffic
     from vdet.traffic.records import BestCrops
@@ -60,6 +61,8 @@ class SinkContext:
     traffic
         Counts and speeds up to the latest result, and the records of vehicles, which are known when
         sinks finish; None for single images.
+    corrections
+        What reviewers say of the counts.
     facts
         Results of steps about the whole video, by name; empty before sinks finish. Sinks that
         finish first may add to them.
@@ -81,6 +84,7 @@ class SinkContext:
     at: Fraction = Fraction(0)
     outputs: tuple[Output, ...] = ()
     traffic: "LiveTraffic | None" = None
+    corrections: "Corrections | None" = None
     facts: dict[str, Fact] = field(default_factory=dict)
     crop_files: dict[int, Path] = field(default_factory=dict)
     clip_files: dict[int, Path] = field(default_factory=dict)

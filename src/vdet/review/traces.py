@@ -7,7 +7,7 @@ vehicles there, is a trace. It is a hint: nothing is counted by it.
 
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import reduce
 
 import cv2
@@ -16,9 +16,9 @@ import numpy as np
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.errors import clock_text, quantity
 from vdet.findings import Finding
+from vdet.review.strips import Band, BandPassage
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts, Trace
-from vdet.traffic.strips import Band, BandPassage
 
 _SAMPLES = 64
 """Number of frames of which the median is the background."""
@@ -189,12 +189,12 @@ def _median(values: Float32Array, is_valid: BoolArray, axis: int) -> Float32Arra
     return np.asarray(median.filled(0), np.float32)
 
 
-def trace_findings(counts: Counts) -> tuple[Finding, ...]:
-    """Return a finding for each line or zone with traces; a single trace is a note."""
+def with_traces(counts: Counts, traces: tuple[Trace, ...]) -> Counts:
+    """Return counts with traces, and a finding for each line or zone; a single trace is a note."""
     vehicles = Counter(event.name for event in counts.events)
     findings = []
-    for name, number in Counter(trace.name for trace in counts.traces).items():
-        times = [trace.time for trace in counts.traces if trace.name == name]
+    for name, number in Counter(trace.name for trace in traces).items():
+        times = [trace.time for trace in traces if trace.name == name]
         starts = Counter(int(time // _INTERVAL) * _INTERVAL for time in times)
         [(start, most)] = starts.most_common(1)
         text = (
@@ -205,4 +205,4 @@ def trace_findings(counts: Counts) -> tuple[Finding, ...]:
         is_many = number > 1 and fraction > _MANY
         spans = tuple((time, time) for time in times)
         findings.append(Finding("traces", text, spans, "warning" if is_many else "note", fraction))
-    return tuple(findings)
+    return replace(counts, traces=traces, findings=(*counts.findings, *findings))

@@ -23,11 +23,11 @@ from traffic.scenes import (
 )
 from vdet.errors import ConfigError
 from vdet.labels.label import SourceVideo
-from vdet.traffic.correcting import apply_corrections
-from vdet.traffic.corrections import Corrections, by_video
+from vdet.review.correcting import apply_corrections
+from vdet.review.corrections import Corrections, by_video
+from vdet.review.estimate import CountError, estimate
 from vdet.traffic.counting import count_frames
-from vdet.traffic.counts import Counts, Event
-from vdet.traffic.estimate import ALL, CountError, VehicleGroup, estimate
+from vdet.traffic.counts import ALL, Counts, Event, VehicleGroup
 
 SECOND = LINE.model_copy(update={"name": "second", "start": (200, 300), "end": (1000, 300)})
 SIZE = WIDTH, HEIGHT

@@ -10,7 +10,7 @@ from benchmarks.pole_cameras import HEIGHT as POLE_HEIGHT
 from benchmarks.pole_cameras import WIDTH as POLE_WIDTH
 from benchmarks.pole_cameras import pole_scene
 
-from traffic.test_corrections import (
+from review.test_corrections import (
     corrected,
     counts,
     error,
@@ -20,10 +20,9 @@ from traffic.test_corrections import (
     ways,
 )
 from vdet.errors import ConfigError
-from vdet.traffic.correcting import apply_corrections
+from vdet.review.correcting import apply_corrections
 from vdet.traffic.counting import count_frames
-from vdet.traffic.counts import Counts, Event
-from vdet.traffic.estimate import ALL, Estimate, VehicleGroup
+from vdet.traffic.counts import ALL, Counts, Estimate, Event, VehicleGroup
 
 
 def spans(*lines: str, start: float = 0.0, end: float = 11.0) -> list[dict[str, Any]]:

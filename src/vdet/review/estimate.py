@@ -3,15 +3,16 @@
 The page of a review computes the same in `estimate.js`, which explains the method and its sources.
 """
 
-from bisect import bisect_left
-from collections.abc import Collection, Mapping, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot, inf, sqrt
+from math import ceil, hypot, inf, sqrt
 
 import numpy as np
 
 from vdet.boxes import Int64Array
-from vdet.traffic.sample import STRATA, strata_of
+from vdet.traffic.clock import Span
+from vdet.traffic.counts import ALL, Estimate, VehicleGroup
 
 MIN_CHECKED = 3
 """Minimum number of drawn spans that an interval needs."""
@@ -22,24 +23,88 @@ _Z = 1.959964
 _ADDED = 0.6
 """Errors added for the upper limit. With 1 (Garwood) it is too high: it holds 97.5 % at least. With
 0.6, no error is seen in at most 6.5 % of the samples where the limit for none is too low."""
-
-
-@dataclass(frozen=True, slots=True)
-class VehicleGroup:
-    """Vehicles in a direction of a line or zone, vehicles of a class, or all: `ALL`."""
-
-    name: str | None = None
-    direction: str | None = None
-    class_name: str | None = None
-
-
-ALL = VehicleGroup()
-
-
 _HIDDEN = 0.1
 """Part of the vehicles of a span that may be missed together in one that was not checked: it widens
 the upper limit, so that it holds where errors come in bursts.
 """
+STRATA = 4
+"""Number of strata."""
+_SPAN = 60.0
+"""Approximate length of a span, seconds."""
+_REST = 0.01
+"""Part of a span that the last one may be longer."""
+
+
+def span_length(seconds: float) -> float:
+    """Return the length of the spans of a video, of which there is at least one."""
+    return round(seconds / max(1, round(seconds / _SPAN)), 6) or _SPAN
+
+
+class EqualSpans:
+    """The spans of a part of a video that have frames; `numbers` are theirs, from 0.
+
+    `video` are the parts with frames, seconds.
+    """
+
+    def __init__(self, start: float, end: float, length: float, video: Iterable[Span]) -> None:
+        self._count = max(1, ceil((end - start) / length - _REST))
+        self._starts = [round(start + number * length, 3) for number in range(self._count)]
+        self._end = end
+        every = ((self._number(first), self._number(last)) for first, last in video)
+        self.numbers = sorted({n for first, last in every for n in range(first, last + 1)})
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def index(self, time: float) -> int:
+        """Return the index of the span of a time, or of the nearest one."""
+        number = self._number(time)
+        return max(0, bisect_right(self.numbers, number) - 1)
+
+    def bounds(self, index: int) -> Span:
+        """Return the start of a span and its end, which is not part of it."""
+        number = self.numbers[index]
+        is_last = number + 1 == self._count
+        return self._starts[number], self._end if is_last else self._starts[number + 1]
+
+    def _number(self, time: float) -> int:
+        return max(0, bisect_right(self._starts, time) - 1)
+
+
+def strata_of(traffic: Sequence[int] | Int64Array) -> Int64Array:
+    """Return the stratum of each span, from 0 with the least traffic: (spans,) int64.
+
+    Strata have about equal sums of the square root of the traffic, as the errors scatter (Cochran,
+    5A.7); equal numbers share one. `traffic` is the number of vehicles counted in each span.
+    """
+    weights = np.sqrt(np.asarray(traffic, np.float64) + 1)
+    order = np.argsort(traffic, kind="stable")
+    middle = np.cumsum(weights[order]) - weights[order] / 2
+    first = np.searchsorted(np.asarray(traffic)[order], traffic)  # of equal numbers
+    strata: Int64Array = (STRATA * middle / weights.sum()).astype(np.int64)[first]
+    return strata
+
+
+def draw_spans(traffic: Sequence[int], seed: int) -> list[int]:
+    """Return all spans in the order in which to check them.
+
+    The first n are a random sample of n spans, stratified by traffic, so a longer sample includes a
+    shorter one. Each stratum has a part of them by the sum of the square root of its traffic.
+
+    Parameters
+    ----------
+    traffic
+        Number of vehicles counted in each span.
+    seed
+        Number that selects one of the possible samples, 0 or more.
+    """
+    strata, turns = strata_of(traffic), np.empty(len(traffic))
+    weights, random = np.sqrt(np.asarray(traffic) + 1.0), np.random.Generator(np.random.PCG64(seed))
+    for stratum in np.unique(strata):
+        members = strata == stratum
+        ranks = random.permutation(np.count_nonzero(members)) + 0.5
+        turns[members] = ranks / weights[members].sum()
+    return [int(span) for span in np.argsort(turns, kind="stable")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,32 +124,6 @@ class CountError:
     span: int
     counted: Collection[VehicleGroup]
     true: Collection[VehicleGroup]
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """The true number of vehicles of a group.
-
-    Attributes
-    ----------
-    counted, corrected
-        Number that was counted in all spans, and with all known errors corrected.
-    true
-        Estimate of the true number.
-    low, high
-        Its interval of 95 %.
-    minutes_to_precision
-        How many more drawn spans are expected to bring half of the width of the interval to 2 % of
-        the true number; 0 if it is that narrow.
-    """
-
-    group: VehicleGroup
-    counted: int
-    corrected: int
-    true: float
-    low: float
-    high: float
-    minutes_to_precision: int
 
 
 def estimate(
@@ -121,13 +160,6 @@ def estimate(
     groups = dict.fromkeys((*counted, *(group for error in errors for group in error.true)))
     none = np.zeros_like(traffic)
     return [survey.estimate(name, np.asarray(counted.get(name, none))) for name in groups]
-
-
-def sums(estimates: Sequence[Estimate]) -> tuple[float, float, float]:
-    """Return the true number in several videos, and its interval: their errors are independent."""
-    true = sum(item.true for item in estimates)
-    below = hypot(*(item.true - item.low for item in estimates))
-    return true, true - below, true + hypot(*(item.high - item.true for item in estimates))
 
 
 @dataclass(frozen=True, slots=True)

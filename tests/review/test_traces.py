@@ -17,13 +17,13 @@ from run.red_runs import outputs
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.loading import load_settings
 from vdet.media import Picture
+from vdet.review.strips import Band, Passages
+from vdet.review.traces import TraceSearch
 from vdet.run.loop import Parts
 from vdet.run.result import findings_in
 from vdet.run.video import Run, run_video
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counts import Trace
-from vdet.traffic.strips import Band, Passages
-from vdet.traffic.traces import TraceSearch
 
 RATE = 12
 SAMPLES = 200

@@ -12,20 +12,21 @@ from vdet.config.schema import Settings
 from vdet.errors import ConfigError
 from vdet.findings import Finding
 from vdet.labels.label import NO_ID
+from vdet.review.corrections import TOLERANCE, Corrections, ReviewedEvent, by_video, paired
+from vdet.review.estimate import CountError, EqualSpans, estimate
 from vdet.traffic.clock import Span
-from vdet.traffic.corrections import Corrections, by_video
 from vdet.traffic.counts import (
+    ALL,
     Corrected,
     Correction,
     Counts,
+    Estimate,
     Event,
+    VehicleGroup,
     class_of,
     unbalanced_zones,
 )
 from vdet.traffic.crossings import APPEAR, ENTER
-from vdet.traffic.estimate import ALL, CountError, Estimate, VehicleGroup, estimate
-from vdet.traffic.reviewed import TOLERANCE, ReviewedEvent, paired
-from vdet.traffic.sample import EqualSpans
 
 _IMBALANCE = "{}: after corrections, more vehicles enter than leave, or fewer; occupancy is unknown"
 NO_FRAME = -1

@@ -12,16 +12,8 @@ from scipy import stats
 
 from browser import browser
 from vdet.pages.render import TEMPLATES
-from vdet.traffic.estimate import (
-    ALL,
-    CountError,
-    Estimate,
-    VehicleGroup,
-    _gamma,
-    _student,
-    estimate,
-)
-from vdet.traffic.sample import draw_spans, strata_of
+from vdet.review.estimate import CountError, _gamma, _student, draw_spans, estimate, strata_of
+from vdet.traffic.counts import ALL, Estimate, VehicleGroup
 
 
 def label(group: VehicleGroup) -> str:
