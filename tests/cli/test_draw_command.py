@@ -1,8 +1,9 @@
-"""`vdet draw`: the page, and the picture for a report."""
+"""`vdet draw`: the page, and pictures of the scene."""
 
 import json
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from conftest import Run
 from pages.html import Elements
 from running import write_drive
+from vdet.media.images import read_image
 from writing import write_image
 
 LINES = """
@@ -106,14 +108,22 @@ def test_the_page_has_only_the_classes_that_are_counted(run: Run) -> None:
         assert result.out.splitlines()[:1] == [f"{output}: written, {vehicles} vehicles"]
 
 
-def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
+def test_a_picture_has_lines_and_numbers_only_where_no_survey_adds_its_own(run: Run) -> None:
     given = ("frame.png", "--tracks-from", "tracks.csv", "-c", "lines.yaml")
     run("draw", *given, "-o", "place.png", code=0)
-    image = cv2.imread("place.png")
-    assert image is not None
-    changed = (image != 90).any(axis=2)
+    changed = (read_image(Path("place.png")) != 90).any(axis=2)
     assert changed[40:200, 100].all()
-    assert changed[60:180, 110:180].any(axis=0).all()  # the arrow of the flow
+    assert not changed[60:180, 130:180].any()  # no arrow of a flow
+    run("draw", "frame.png", "-o", "plain.png", code=0)
+    assert (read_image(Path("plain.png")) == 90).all()
+    count = ("count", "tracks.csv", "-c", "lines.yaml", "--counts", "c.xlsx", "--overwrite")
+    pictures = []
+    for name in ("frame.png", "place.png"):
+        run(*count, "--set", f"survey.picture={name}", code=0)
+        with ZipFile("c.xlsx") as book:
+            picture = Path(book.extract("xl/media/image1.jpeg"))
+        pictures.append(read_image(picture).astype(int))
+    assert np.abs(pictures[0] - pictures[1]).max() < 60
     run("draw", *given, "-o", "place.svg", code=0)
     drawn = Elements(Path("place.svg").read_text("utf-8"))
     assert drawn.text.split() == ["6", "gate", "left", "6", "right", "0"]
@@ -124,7 +134,7 @@ def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
     [
         ((), "Missing option '-o'"),
         (("-o", "a.txt"), "a.txt: outputs must end in .html, .jpg, .png, .svg"),
-        (("-o", "a.jpg"), "no lines or zones to count at; add them to the settings"),
+        (("-o", "a.svg"), "no lines or zones to count at; add them to the settings"),
         (("-o", "lines.html", "-c", "wide.yaml"), "whose aspect ratio"),
         (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),
         (("-o", "a.html", "--tracks-from", "t.txt"), "t.txt: has no times"),

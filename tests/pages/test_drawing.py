@@ -127,6 +127,28 @@ def test_a_line_is_drawn_dragged_named_saved_and_opened_again(
     assert window.text("#text") == saved.read_text()
 
 
+def test_a_line_has_fields_for_the_side_that_is_in_and_for_its_approach(
+    window: Browser, tmp_path: Path
+) -> None:
+    window.open(written(tmp_path, drawing(list(frames(*DOWN)))))
+    window.type("l")
+    window.click((200, 400), (1000, 420))
+    for field, value in (("in", "down"), ("approach", "NE"), ("in", ""), ("in", "up")):
+        window.run(
+            "const field = get(`field-${arguments[0]}`); field.value = arguments[1];"
+            "field.dispatchEvent(new Event('change'))",
+            *(field, value),
+        )
+        assert window.run("return get(`field-${arguments[0]}`).value", field) == value
+        [line] = parse_document(window.text("#text"), "text").values["traffic"]["lines"]
+        sides = {"down": ("out", "in"), "up": ("in", "out")}.get(
+            value, (line["left"], line["right"])
+        )
+        assert (line["left"], line["right"]) == sides
+    assert line["approach"] == "NE"
+    assert "in 0 · out 6" in window.text("#list")
+
+
 def test_zones_regions_and_points_are_drawn_by_keys_and_undone(
     window: Browser, tmp_path: Path
 ) -> None:
@@ -155,12 +177,11 @@ def test_zones_regions_and_points_are_drawn_by_keys_and_undone(
         ((400.5, 100.5), ("0", "50")),
     ):
         window.click(point)
-        for axis, value in enumerate(metres):
-            window.run(
-                "const field = get(arguments[0]); field.value = arguments[1];"
-                "field.dispatchEvent(new Event('change'))",
-                *(f"metres-{axis}", value),
-            )
+        window.type(metres[0], ENTER, metres[1], ENTER)
+    texts = window.run(
+        "return [...document.querySelectorAll('.ground text')].map(e => e.textContent)"
+    )
+    assert texts == ["1: 0, 0 m", "2: 10, 0 m", "3: 10, 50 m", "4: 0, 50 m"]
     assert window.run("return document.querySelectorAll('#marks polyline.grid').length") > 10
     values = parse_document(window.text("#text"), "text").values
     assert [value["metres"] for value in values["camera"]["ground"]] == [
@@ -191,15 +212,21 @@ def test_two_known_lengths_along_a_lane_or_its_width_are_enough_for_the_ground(
         return 640 + focal * x / depth, 360 + focal * down / depth
 
     window.open(written(tmp_path, drawing(list(frames(*DOWN)))))
-    window.type("g")
+    window.type("m")
     lane = [(22, 0), (46, 0), (22, 3.5), (46, 3.5)]
     for point in lane if is_width else [(22,), (25,), (46,), (55,)]:
         window.click(seen(*point))
+    texts = window.run(
+        "return [...document.querySelectorAll('#marks > text')].map(e => e.textContent)"
+    )
+    assert texts == ["1", "2", "3", "4"]
+    assert "ground" not in window.text("#text")
     for name, value in (
-        {"lane-width": 3.5}.items() if is_width else {"length-1": 3, "length-3": 9}.items()
-    ):
-        window.run("get(arguments[0]).value = arguments[1]", name, value)
-    window.run("get('lengths').click()")
+        {"lane-width": "3.5"} if is_width else {"length-1": "3", "length-3": "9"}
+    ).items():
+        window.run("get(arguments[0]).focus()", name)
+        window.type(value)
+    window.type(ENTER)
     values = parse_document(window.text("#text"), "text").values["camera"]["ground"]
     ground = fit_ground(
         np.array([value["pixel"] for value in values]) + 0.5,
@@ -221,15 +248,11 @@ def test_metres_by_which_cars_are_far_too_wide_have_a_warning(
         for frame in video
     ]
     window.open(written(tmp_path, drawing(cars)))
-    window.type("g")
-    for point in ((300, 700), (500, 300), (1000, 700), (800, 300)):
-        window.click(point)
     for width in (8, 100):
-        window.run(
-            "document.querySelector('#list .row').click();"
-            "get('lane-width').value = arguments[0]; get('lengths').click()",
-            width,
-        )
+        window.type("m")
+        window.click((300, 700), (500, 300), (1000, 700), (800, 300))
+        window.run("get('lane-width').focus()")
+        window.type(str(width), ENTER)
         warning = window.text("#warnings")
         assert bool(warning) == (width == 100)
     assert warning == "ground: cars are 19.7 m wide by these points; check their metres"

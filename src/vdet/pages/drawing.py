@@ -20,8 +20,10 @@ from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.pages.traffic import DrawnMark, traffic_marks, with_marks
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
+from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import lines_and_zones
 from vdet.traffic.linking import VehiclePath, link_tracks
+from vdet.traffic.measures import APPROACHES
 
 _SECTIONS = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
 """The lists that the page edits, and their section in the settings file."""
@@ -68,18 +70,17 @@ class Drawing:
     def output(self, path: Path, name: str) -> bytes:
         """Return the content of a file by the suffix of `path`: a page or an image.
 
+        `.svg` has counts and flows. Other images have none, so that a survey can add its own.
         `name` is the name of the settings file that the page saves. Raises `ConfigError`.
         """
         if path.suffix.lower() == ".html":
             return self._page(name).encode("utf-8", "backslashreplace")
-        marks = self._marks()
-        if path.suffix.lower() == ".svg":
-            width, height = self._size
-            svg = render(
-                "traffic.svg", picture=self._image, width=width, height=height, marks=marks
-            )
-            return svg.encode("utf-8", "backslashreplace")
-        return encode_image(with_marks(self._image, marks), path)
+        if path.suffix.lower() != ".svg":
+            return encode_image(with_marks(self._image, self._marks(counts=[])), path)
+        marks = self._marks([count_frames(self._frames, self._settings, self._size)])
+        width, height = self._size
+        svg = render("traffic.svg", picture=self._image, width=width, height=height, marks=marks)
+        return svg.encode("utf-8", "backslashreplace")
 
     def _page(self, name: str) -> str:
         shapes, other_settings = split(self._values, self._size)
@@ -91,19 +92,19 @@ class Drawing:
             "picture": jpeg_uri(self._image),
             "paths": pack_paths(self.paths),
             "places": shapes,
+            "approaches": APPROACHES,
             "rest": other_settings,
         }
         scripts = ((TEMPLATES / script).read_text("utf-8") for script in ("yaml.js", "draw.js"))
         script = Markup("\n".join(scripts))
         return render("draw.html", data=data, name=name, script=script, findings=self._findings)
 
-    def _marks(self) -> list[DrawnMark]:
-        counts = count_frames(self._frames, self._settings, self._size)
+    def _marks(self, counts: Sequence[Counts]) -> list[DrawnMark]:
         lines, zones = lines_and_zones(self._settings.traffic, *self._size)
         paths = {
             key: path.points.tolist() for path in self.paths for key in np.unique(path.ids).tolist()
         }
-        return traffic_marks(self._size, (*lines, *zones), [counts], paths)
+        return traffic_marks(self._size, (*lines, *zones), counts, paths)
 
 
 def split(

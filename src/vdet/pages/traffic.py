@@ -59,10 +59,11 @@ def traffic_marks(
 ) -> list[DrawnMark]:
     """Return the marks to draw on frames of this width and height, pixels.
 
-    `paths` are those of tracks by id, pixels.
+    `paths` are those of tracks by id, pixels. Without `videos` there are no numbers.
     """
     groups = EventGroups(videos)
-    totals = {direction: len(events) for direction, events in groups.directions.items()}
+    numbers = {direction: len(events) for direction, events in groups.directions.items()}
+    totals = numbers if videos else None
     marks = [mark for border in borders for mark in border_marks(border, totals)]
     flows = groups.flows.values()
     maximum = max(map(len, flows), default=1)
@@ -105,7 +106,7 @@ def direction_color(start: Point, end: Point) -> Color:
 
 
 def border_marks(
-    border: Border, totals: Mapping[Direction, int], text: str = ""
+    border: Border, totals: Mapping[Direction, int] | None, text: str = ""
 ) -> Iterator[DrawnMark]:
     """Yield the marks of a zone with its name and a text, or of a line with its name and counts.
 
@@ -125,8 +126,8 @@ def border_marks(
     ends, reaches = (border.start, border.end), (_SIDE * height, -_SIDE * height)
     for (x, y), reach, direction in zip(ends, reaches, border.directions, strict=True):
         tip = x + reach * left[0], y + reach * left[1]
-        label = f"{direction} {totals.get((border.name, direction), 0)}"
-        yield DrawnMark(((x, y), tip), boxes.LINE, width, label, tip, is_arrow=True)
+        number = "" if totals is None else f" {totals.get((border.name, direction), 0)}"
+        yield DrawnMark(((x, y), tip), boxes.LINE, width, direction + number, tip, is_arrow=True)
 
 
 def draw_marks(surface: Surface, marks: Iterable[DrawnMark]) -> None:

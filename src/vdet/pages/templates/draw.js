@@ -590,8 +590,8 @@ async function openPage(data) {
   }
 
   function label([x, y], lines, anchor = "middle", name = "") {
-    const letter = (stage.clientWidth < 600 ? 10 : 13) * unit();
-    return el("text", { x, y, "font-size": letter, "text-anchor": anchor, class: name },
+    const letter = (stage.clientWidth < 600 ? 10 : 13) * unit(), [left, right] = [0.06 * width, 0.94 * width];
+    return el("text", { x, y, "font-size": letter, "text-anchor": x < left ? "start" : x > right ? "end" : anchor, class: name },
       ...lines.filter(line => line).map((line, i) => el("tspan", { x, dy: i ? 1.15 * letter : 0 }, line)));
   }
 
@@ -603,8 +603,9 @@ async function openPage(data) {
     if (hovered)
       marks.append(el("polyline", { class: "hovered", points: Array.from({ length: hovered.seen },
         (_, row) => `${hovered.xs[row]},${hovered.ys[row]}`).join(" ") }));
-    const shown = pointer && tool !== "select" ? [...drawn, pointer] : drawn;
-    marks.append(el("polyline", { points: shown.join(" "), class: "new" }), ...shown.map(each => dot(each, 5, "new")));
+    const shown = pointer && tool !== "select" ? [...drawn, pointer] : drawn, isOpen = tool === "lengths";
+    marks.append(isOpen ? "" : el("polyline", { points: shown.join(" "), class: "new" }), ...shown.map(each => dot(each, 5, "new")),
+      ...(isOpen ? drawn.map(([x, y], index) => label([x, y - 11 * unit()], [String(index + 1)])) : []));
   }
 
   function drawItem(kind, each, index) {
@@ -615,11 +616,12 @@ async function openPage(data) {
     if (kind === "lines") {
       const [start, end] = points, length = Math.hypot(end[0] - start[0], end[1] - start[1]) || 1;
       const left = [(end[1] - start[1]) / length, (start[0] - end[0]) / length];
-      group.append(...segment(points), ...sideOf(each.left, left, points, index),
-        ...sideOf(each.right, left.map(value => -value), points, index),
-        label([start[0], start[1] - 9 * unit()], [each.name]));
+      const at = fraction => start.map((value, i) => value + fraction * (end[i] - value));
+      group.append(...segment(points), ...sideOf(each.left, left, at(0.03), index),
+        ...sideOf(each.right, left.map(value => -value), at(0.97), index),
+        label([at(0.5)[0], at(0.5)[1] - 9 * unit()], [each.name]));
     } else if (kind === "ground") {
-      group.append(label([points[0][0], points[0][1] - 11 * unit()], [metresOf(each)]));
+      group.append(label([points[0][0], points[0][1] - 11 * unit()], [`${index + 1}: ${metresOf(each)}`]));
     } else {
       const top = points.reduce((best, point) => point[1] < best[1] ? point : best);
       const count = way => countOf(found[places.lines.length + index], way).total;
@@ -633,14 +635,13 @@ async function openPage(data) {
   }
 
   /** Return the arrow to a side of a line, with what goes there; `way` has length 1. */
-  function sideOf(name, way, [start, end], index) {
-    const { total } = countOf(found[index], name), middle = start.map((value, i) => (value + end[i]) / 2);
-    const tip = middle.map((value, i) => value + 26 * unit() * way[i]);
+  function sideOf(name, way, from, index) {
+    const { total } = countOf(found[index], name), tip = from.map((value, i) => value + 26 * unit() * way[i]);
     const wing = sign => tip.map((value, i) => value - 7 * unit() * (way[i] + (i ? sign : -sign) * way[1 - i] / 2));
     const down = way[1] > 0.3 ? 16 : way[1] > -0.3 ? 4 : -7;
     const at = [tip[0] + 10 * unit() * way[0], clamp(tip[1] + down * unit(), 14 * unit(), height - 4 * unit())];
     const anchor = way[0] > 0.5 ? "start" : way[0] < -0.5 ? "end" : "middle";
-    return [el("polyline", { points: [middle, tip, wing(1), tip, wing(-1)].join(" ") }),
+    return [el("polyline", { points: [from, tip, wing(1), tip, wing(-1)].join(" ") }),
       label(at, [`${name} ${total}`], anchor, "count")];
   }
 
@@ -674,33 +675,41 @@ async function openPage(data) {
   // ------------------------------------------------ the panel
   function showDetails() {
     const each = item(), box = get("details"), button = (text, onclick, id) => el("button", { onclick, id }, text);
-    box.hidden = !each;
-    if (!each) return box.replaceChildren();
+    const isLengths = tool === "lengths" && drawn.length === 4;
+    box.hidden = !each && !isLengths;
+    if (!each) return box.replaceChildren(...(isLengths ? [fieldsOfLengths()] : []));
     const field = (text, id, value, set, type = "text") => el("label", {}, text,
       el("input", { id, value, type, step: "any", maxlength: 80, onchange: event => change(() => set(event.target.value.trim())) }));
+    const choice = (text, id, value, values, set) => el("label", {}, text, el("select", { id, onchange: event =>
+      change(() => set(event.target.value)) }, ...["", ...values].map(name => new Option(name || "–", name, false, name === (value ?? "")))));
     const names = ["name", "left", "right"].filter(key => each[key] !== undefined).map(key =>
       field(key[0].toUpperCase() + key.slice(1), `field-${key}`, each[key], text => { each[key] = text || each[key]; }));
+    const sides = each.start && sideNames(each.start, each.end), inward = each.left === "in" ? "left" : each.right === "in" && "right";
+    if (sides) names.push(
+      choice("In is", "field-in", sides[inward], Object.values(sides), way => Object.assign(each, !way ? sides :
+        way === sides.left ? { left: "in", right: "out" } : { left: "out", right: "in" })),
+      choice("Approach", "field-approach", each.approach, data.approaches, arm => { each.approach = arm || undefined; }));
     const metres = (each.metres ?? []).map((value, i) => field(`Metres ${i ? "along" : "across"}`, `metres-${i}`, value,
       text => { each.metres[i] = Number(text) || 0; }, "number"));
     box.replaceChildren(el("h3", {}, `Selected ${KINDS[selected.kind]}`), ...names, ...metres,
-      each.start ? button("Swap sides (S)", swap, "swap") : "", button("Delete (Del)", remove, "delete"),
-      ...(each.metres && places.ground.length === 4 ? fieldsOfLengths(button) : []));
+      each.start ? button("Swap sides (S)", swap, "swap") : "", button("Delete (Del)", remove, "delete"));
   }
 
-  /** Return fields that replace four points by a plane in metres. */
-  function fieldsOfLengths(button) {
+  /** Return fields that make a plane in metres of four points along a lane. */
+  function fieldsOfLengths() {
     const inputs = [1, 3].map(first => el("input", { type: "number", step: "any", id: `length-${first}` }));
     const laneWidth = el("input", { type: "number", step: "any", id: "lane-width" });
-    const set = () => {
-      const pixels = places.ground.map(each => each.pixel), lengths = inputs.map(input => Number(input.value));
+    const set = event => {
+      event.preventDefault();
+      const pixels = drawn.map(point => point.map(value => value - 0.5)), lengths = inputs.map(input => Number(input.value));
       const made = laneWidth.value ? groundOfLane(pixels, Number(laneWidth.value), size) : levelGround(pixels, lengths, size);
-      if (made) change(() => { [places.ground, selected] = [made, null]; });
+      if (made) change(() => { places.ground = made; setTool("select"); });
       else say("These lengths do not fit the points: points 1 and 2, then 3 and 4, must go from near to far.");
     };
-    return [el("p", {}, "Ends of two known lengths along one straight lane, from near to far. The camera is assumed to be level."),
+    return el("form", { onsubmit: set }, el("p", {}, "Ends of two known lengths along one straight lane, from near to far. The camera is assumed to be level."),
       ...inputs.map((input, i) => el("label", {}, `Points ${2 * i + 1} to ${2 * i + 2}, m`, input)),
       el("p", {}, "Or the width of a lane: points 1 and 2 on its left line, 3 and 4 on its right line, from near to far."),
-      el("label", {}, "Width of the lane, m", laneWidth), button("Set the metres", set, "lengths")];
+      el("label", {}, "Width of the lane, m", laneWidth), el("button", {}, "Set the metres (Enter)"));
   }
 
   function showList() {
@@ -739,9 +748,10 @@ async function openPage(data) {
 
   function setTool(name) {
     [tool, drawn] = [name, []];
+    if (name === "lengths") selected = null;
     for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.tool === name);
     say(hint());
-    drawMarks();
+    refresh();
     showLens();
   }
 
@@ -761,12 +771,14 @@ async function openPage(data) {
   function putPoint(point) {
     if (tool === "ground") {
       add("ground", { pixel: point.map(value => value - 0.5), metres: [0, 0] });
-      return get("metres-0").focus({ preventScroll: true });
+      return get("metres-0").select();
     }
+    if (tool === "lengths" && drawn.length === 4) return;
     const isAt = other => Math.hypot(other[0] - point[0], other[1] - point[1]) < 10 * unit();
     if (drawn.length > 2 && isAt(drawn[0])) return endShape();
     if (!drawn.length || !isAt(drawn.at(-1))) drawn.push(point);
     if (tool === "line" && drawn.length === 2) endShape();
+    if (tool === "lengths" && drawn.length === 4) showDetails(), get("length-1").focus({ preventScroll: true });
     drawMarks();
   }
 
@@ -780,7 +792,7 @@ async function openPage(data) {
 
   function endShape() {
     const points = drawn, kind = tool;
-    if (points.length < (kind === "line" ? 2 : 3)) return;
+    if (kind === "lengths" || points.length < (kind === "line" ? 2 : 3)) return;
     setTool("select");
     const [start, end] = points;
     if (kind === "line") add("lines", { name: freeName("line"), start, end, ...sideNames(start, end) });
@@ -845,17 +857,21 @@ async function openPage(data) {
 
   function type(event) {
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key, isControl = event.ctrlKey || event.metaKey;
-    const isField = event.target.tagName === "INPUT" && event.target.type !== "checkbox";
+    const isField = event.target.matches("select, input:not([type=checkbox])");
     const button = document.querySelector(`[data-key="${CSS.escape((isControl ? "^" : "") + key)}"]`), arrow = ARROWS[key];
-    if (isField && (key === "Enter" || key === "Escape")) return stage.focus({ preventScroll: true });
+    if (isField && key === "Enter" && event.target.form) return; // which accepts them
+    if (isField && (key === "Enter" || key === "Escape")) {
+      stage.focus({ preventScroll: true });
+      return key === "Enter" && event.target.id === "metres-0" ? get("metres-1").select() : undefined;
+    }
     if (isField || event.altKey || (event.target.tagName === "BUTTON" && key === "Enter")) return;
     if (isControl && event.shiftKey && key === "z") travel(future, past);
     else if (button) button.click(), stage.focus({ preventScroll: true });
     else if (isControl) return;
     else if (key === "s") swap();
     else if (key === "n" && selected) selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length, drawMarks();
-    else if (key === "Delete" || key === "Backspace") drawn.length ? (drawn.pop(), drawMarks()) : remove();
-    else if (key === "Escape") [drawn, selected] = [[], null], setTool("select"), refresh();
+    else if (key === "Delete" || key === "Backspace") drawn.length ? (drawn.pop(), drawMarks(), showDetails()) : remove();
+    else if (key === "Escape") selected = null, setTool("select");
     else if (key === "Enter" && tool !== "select") pressEnter();
     else if (arrow) step(arrow.map(value => value * (event.shiftKey ? 20 : 1)));
     else return;
@@ -864,7 +880,7 @@ async function openPage(data) {
 
   /** Put a point where the crosshair is; where it was just put, the shape ends. */
   function pressEnter() {
-    if (drawn.length > 2 && (!pointer || String(drawn.at(-1)) === String(pointer))) endShape();
+    if (tool !== "lengths" && drawn.length > 2 && (!pointer || String(drawn.at(-1)) === String(pointer))) endShape();
     else putPoint(pointer ?? [width / 2, height / 2]);
   }
 
@@ -909,7 +925,6 @@ async function openPage(data) {
   for (const [name, handler] of Object.entries(handlers)) stage.addEventListener(name, handler);
   addEventListener("keydown", type);
   addEventListener("beforeunload", event => { if (JSON.stringify(places) !== saved) event.preventDefault(); });
-  refresh();
   setTool("select");
   new ResizeObserver(() => { paintPaths(); drawMarks(); }).observe(stage);
   document.body.dataset.ready = "yes";
