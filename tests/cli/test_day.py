@@ -31,6 +31,11 @@ def test_the_pages_of_a_day_are_linked(run: Run, tmp_path: Path, red: tuple[str,
         window.open(out / "b/b.review/review.html")
         window.type(ENTER)
         window.visit(out / "reviews.html")
+        # The storage of one page reaches another in its own time.
+        window.wait(
+            "dispatchEvent(new Event('focus'));"
+            "return document.querySelector('th:last-child').checkVisibility()"
+        )
         checked = [[*heading, "checked"], ["a/a", "1", "1", ""], ["b/b", "1", "1", "1"]]
         assert window.run(rows) == checked
 
@@ -43,4 +48,8 @@ def test_the_pages_of_a_day_are_linked(run: Run, tmp_path: Path, red: tuple[str,
         assert {str(out / review) for review in reviews} < set(links)
         window.visit(out / "a/a.page/page.html")
         texts = window.run("return [...document.links].map(link => link.textContent)")
+        lists = [("a/a.page/page.html", "index.html"), ("b/b.review/review.html", "reviews.html")]
+        for page, listed in lists:
+            window.visit(out / page)
+            assert window.run("return document.links[0].href") == (out / listed).as_uri()
         assert texts.count("clip") == texts.count("Check the counts") == 1

@@ -85,14 +85,15 @@ def make_plan(
     sources = find_sources(clips)
     _reject_nested(clips, sources, folder)
     settings_files = tuple(path.absolute() for path in common.settings_files)
-    common = replace(common, settings=settings, settings_files=settings_files)
-    runs = [_run_of(source, folder, common) for source in sources]
     totals = tuple(
         TotalFile(folder / f"{kind.name}{kind.suffix or ending}", kind, number, ending)
         for number, output in enumerate(common.outputs)
         for ending in [output.path.name]
         if (kind := sink_kind(output.sink).total)
     )
+    linked = tuple(Output(common.outputs[total.output_number].sink, total.path) for total in totals)
+    common = replace(common, settings=settings, settings_files=settings_files, totals=linked)
+    runs = [_run_of(source, folder, common) for source in sources]
     _reject_shared(runs, totals, folder)
     videos = (source.path for source in sources)
     inputs = input_files(*videos, *settings_files, settings=settings)

@@ -2,12 +2,14 @@
 
 import base64
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import cv2
+from markupsafe import Markup, escape
 
 from vdet.boxes import Image
 from vdet.errors import escaped, quantity
@@ -36,7 +38,13 @@ def render(template: str, **values: Any) -> str:
     )
     environment.filters |= {"quantity": quantity, "jpeg": jpeg_uri, "hex": hex_color}
     environment.filters |= {"clock": time_text, "line": lambda text: escaped(str(text))}
+    environment.filters |= {"name": _breakable}
     return environment.get_template(template).render(values, version=__version__)
+
+
+def _breakable(name: str) -> Markup:
+    """Return a name that is broken at its separators rather than in its numbers."""
+    return Markup(re.sub(r"(?<=[-_/.])", "<wbr>", escape(name)))
 
 
 def jpeg_uri(image: Image, max_side: int | None = None) -> str:

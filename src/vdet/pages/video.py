@@ -83,6 +83,8 @@ class VideoPage:
         By id, the address of a clip that shows a vehicle, as in `pictures`.
     review
         The address of the review of the counts; empty if the run writes none.
+    index
+        The address of the page over all videos of a batch; empty without one.
     """
 
     video: VideoInfo
@@ -100,6 +102,7 @@ class VideoPage:
     findings: Sequence[Finding] = ()
     clips: Mapping[int, str] = field(default_factory=dict)
     review: str = ""
+    index: str = ""
 
     @property
     def counts(self) -> Counts | None:
@@ -172,6 +175,7 @@ class VideoPage:
         return render(
             "video.html",
             page=self,
+            index=self.index,
             figures=self._figures(),
             shown=shown,
             time_axis=x,

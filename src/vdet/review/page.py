@@ -234,11 +234,14 @@ def _values(mark: EventMark) -> dict[str, Any]:
     return place | names | {"vehicle": event.vehicle}
 
 
-def write_review(file: TextIO, review: Review, folder: Path) -> None:
-    """Write the page. `folder` has its pictures, WebP files; a vehicle may have none."""
+def write_review(file: TextIO, review: Review, folder: Path, index: str) -> None:
+    """Write the page. `folder` has its pictures, WebP files; a vehicle may have none.
+
+    `index` is the address of the list of all reviews of a batch; empty without one.
+    """
     scripts = [Markup((TEMPLATES / name).read_text("utf-8")) for name in _SCRIPTS]
-    name, findings = review.video.name, review.findings
-    page = render("review.html", data=review.data(), scripts=scripts, name=name, findings=findings)
+    values = {"review": review, "data": review.data(), "index": index}
+    page = render("review.html", scripts=scripts, **values)
     before, _, after = page.partition(_PICTURES)
     file.write(before)
     crops = {crop_name(mark.event.id) for mark in review.marks}
@@ -331,11 +334,17 @@ class ReviewRecorder:
         return tuple(sorted(self._traces, key=lambda trace: trace.time))
 
     def write(
-        self, path: Path, counted: Counts, counts: Counts, corrections: Corrections | None
+        self,
+        path: Path,
+        counted: Counts,
+        counts: Counts,
+        corrections: Corrections | None,
+        index: str,
     ) -> dict[str, Any]:
         """Write the page, and return what `reviews.html` says of it.
 
-        `counted` are the counts before `corrections`, which the page opens.
+        `counted` are the counts before `corrections`, which the page opens; `index` as for
+        `write_review`.
         """
         opened = None
         if corrections:
@@ -356,7 +365,7 @@ class ReviewRecorder:
             added=self._marks([item.right for item in every if item.right and not item.counted]),
         )
         with path.open("w", encoding="utf-8", errors="backslashreplace") as file:
-            write_review(file, review, Path(self._folder.name))
+            write_review(file, review, Path(self._folder.name), index)
         return {
             "key": review.key,
             "vehicles": len({event.vehicle for event in counted.events}),

@@ -63,6 +63,8 @@ class Run:
         The files that the settings were read from; no output replaces them.
     corrections
         Files of corrections of its counts.
+    totals
+        The files over all videos of its batch, which its outputs link to.
     """
 
     source: Path
@@ -76,6 +78,7 @@ class Run:
     threads: int | None = None
     settings_files: tuple[Path, ...] = ()
     corrections: tuple[Path, ...] = ()
+    totals: tuple[Output, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", Path(self.source))  # notebooks pass text
@@ -396,6 +399,7 @@ def write_outputs(
             end=run.end,
             at=run.at,
             outputs=run.outputs,
+            totals=run.totals,
             traffic=traffic,
             corrections=results.corrections,
             facts=results.facts,

@@ -23,18 +23,19 @@ const columns = [
   { name: "class", text: i => data.class[i], key: i => data.class[i] },
   { name: "video", text: i => data.names[data.video[i]], key: i => data.video[i], used: "video" },
   { name: "time", text: timeText, key: i => data.clock[i] ?? data.first[i], link: moment },
+  { name: "clip", text: i => data.clip[i] && "clip", key: i => data.clip[i], link: i => data.clip[i], used: "clip" },
   { name: "seconds", text: i => data.seconds[i].toFixed(1), key: i => data.seconds[i] },
   { name: "km/h", text: i => number(data.speed[i]), key: i => data.speed[i], used: "speed" },
   { name: "lines", text: i => data.lines[i], key: i => data.lines[i], used: "lines" },
-  { name: "lane", text: i => data.lane[i] ?? "–", key: i => data.lane[i], used: "lane" },
+  { name: "lane", text: i => data.lane[i] ?? "", key: i => data.lane[i], used: "lane" },
   { name: "metres", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
   { name: "motion", text: i => data.motion[i], key: i => data.motion[i], used: "motion" },
   { name: "side", text: i => data.side[i], key: i => data.side[i], used: "side" },
   { name: "size", text: i => data.size[i], key: i => data.size[i], used: "size" },
-  { name: "clip", text: i => data.clip[i] && "clip", key: i => data.clip[i], link: i => data.clip[i], used: "clip" },
 ].filter(column => !column.used || known.has(column.used));
 
 const form = document.getElementById("filters");
+const filter = document.getElementById("filter");
 const body = document.querySelector("#found tbody");
 let rows = [];
 let unknown = 0; // rows that pass no filter of a value that they lack, and pass all others
@@ -43,7 +44,7 @@ let page = 0;
 let sort = { column: null, descending: false };
 
 function number(value) {
-  return value === null ? "–" : value.toFixed(0);
+  return value?.toFixed(0) ?? "";
 }
 
 function pad(value) {
@@ -128,6 +129,7 @@ function cell(column, i) {
   } else {
     element.textContent = column.text(i);
   }
+  if (!isNaN(element.textContent)) element.dataset.name = column.name; // where there are no headings above
   return element;
 }
 
@@ -167,6 +169,8 @@ function update() {
     const isSet = [...label.querySelectorAll("input, select")].some(input => input.value);
     label.classList.toggle("unprinted", !isSet);
   }
+  const used = form.querySelectorAll("label:not(.unprinted)").length;
+  filter.firstElementChild.textContent = used ? `Filter (${used})` : "Filter";
 }
 
 function heading(column) {
@@ -205,7 +209,15 @@ document.getElementById("previous").addEventListener("click", () => { page -= 1;
 document.getElementById("next").addEventListener("click", () => { page += 1; show(); });
 
 // On paper, the table goes on over the pages of the screen.
-let left = 0;
-addEventListener("beforeprint", () => { [left, page, limit] = [page, 0, PRINTED]; show(); });
-addEventListener("afterprint", () => { [page, limit] = [left, PER_PAGE]; show(); });
+let left = {};
+addEventListener("beforeprint", () => {
+  left = { page, open: filter.open };
+  [page, limit, filter.open] = [0, PRINTED, true];
+  show();
+});
+addEventListener("afterprint", () => { [page, limit, filter.open] = [left.page, PER_PAGE, left.open]; show(); });
+
+filter.open = matchMedia("(min-width: 601px)").matches;
 update();
+// On the way back to this page, the browser fills in the filters after its scripts have run.
+addEventListener("pageshow", event => { if (!event.persisted) update(); });

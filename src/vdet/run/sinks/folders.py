@@ -160,6 +160,7 @@ class PageSink(BaseSink):
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.traffic
+        review = self.context.path_of("review")
         return VideoPage(
             video=self.video,
             frames=self._frames,
@@ -175,13 +176,9 @@ class PageSink(BaseSink):
             pictures=self._addresses(self.context.crop_files),
             findings=findings_in(self.context.facts).items,
             clips=self._addresses(self.context.clip_files),
-            review=self._review(),
+            review=link_to(review / REVIEW_NAME, self.path) if review else "",
+            index=_index(self, "page"),
         )
-
-    def _review(self) -> str:
-        """Return the address of the review of the counts, if this run writes one."""
-        folders = self._paths_of("review")
-        return link_to(folders[0] / REVIEW_NAME, self.path) if folders else ""
 
     def _addresses(self, files: Mapping[int, Path]) -> dict[int, str]:
         """Return the addresses of files by the id of a vehicle."""
@@ -190,17 +187,19 @@ class PageSink(BaseSink):
     def _player(self) -> Player | None:
         """Return the video that this run writes, else the source if it is a video file."""
         source = self.video.path
-        drawn = self._paths_of("video")
+        drawn = self.context.path_of("video")
         if not drawn and (not source.is_file() or is_image_name(source)):
             return None
         path, start = source, 0.0
         if drawn:
-            path, start = drawn[0], self._spans[0][0] if self._spans else start
+            path, start = drawn, self._spans[0][0] if self._spans else start
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
-    def _paths_of(self, sink: str) -> list[Path]:
-        """Return the outputs of a sink in this run."""
-        return [output.path for output in self.context.outputs if output.sink == sink]
+
+def _index(sink: BaseSink, name: str) -> str:
+    """Return the address of the file over all videos of the batch for pages; empty without one."""
+    path = sink.context.path_of(name, in_batch=True)
+    return link_to(path, sink.path) if path else ""
 
 
 _INDEX = BatchTotal("index", write_index, ".html", of_failed=lambda error: {"error": error})
@@ -364,7 +363,8 @@ class ReviewSink(BaseSink):
         assert counts
         assert counted
         facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
-        facts_of_page = self._recorder.write(self._file, counted, counts, self.context.corrections)
+        given, index = self.context.corrections, _index(self, "review")
+        facts_of_page = self._recorder.write(self._file, counted, counts, given, index)
         self.summary = {"page": f"{self.path.name}/{REVIEW_NAME}", **facts_of_page}
 
 
