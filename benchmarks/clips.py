@@ -15,8 +15,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from vdet.config.schema import ClipSettings, OutputSettings, Settings
-from vdet.detect.factory import load_detector
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.loop import Parts

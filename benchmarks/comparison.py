@@ -23,9 +23,8 @@ from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import Label, SavedTracks
 from vdet.labels.reading import read_truth
 from vdet.run.result import FrameResult
-from vdet.synthetic.render import write_clip
+from vdet.synthetic.render import write_clip, write_truth
 from vdet.synthetic.scene import Scene, SceneVehicle, pole_scene
-from vdet.synthetic.truth import write_truth
 from vdet.track.track import Track
 
 SEEDS = (1, 2, 3, 4)

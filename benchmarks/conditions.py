@@ -22,9 +22,8 @@ from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.findings import Findings
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer
+from vdet.synthetic.render import Renderer, true_boxes
 from vdet.synthetic.scene import Scene, pole_scene
-from vdet.synthetic.truth import true_boxes
 from vdet.track.track import Track
 
 CHANGE = 4.0

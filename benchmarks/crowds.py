@@ -12,14 +12,13 @@ import numpy as np
 
 from benchmarks.drawn_traffic import as_planes, follow, shown_labels, true_labels
 from vdet.config.schema import Settings
-from vdet.detect.factory import load_detector
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.evaluate.scores import Scores, score
-from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import frames
 from vdet.synthetic.scene import (
     LANE_WIDTH,
     LORRY,
+    PinholeCamera,
     Scene,
     SceneVehicle,
     Waypoint,

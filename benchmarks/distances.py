@@ -19,15 +19,13 @@ from benchmarks.drawn_traffic import TruePlace, follow, lane_view, traffic_scene
 from vdet.boxes import Image
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import LaneSettings, Settings
-from vdet.detect.factory import load_detector
+from vdet.detect.detectors import load_detector
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Frame, Picture
 from vdet.run.steps import LaneStep, with_positions
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import must_be_found, true_boxes
+from vdet.synthetic.render import Renderer, must_be_found, true_boxes
+from vdet.synthetic.scene import PinholeCamera, Scene, SceneVehicle, Waypoint
 from vdet.track.track import Track
 
 FRAMES = 100

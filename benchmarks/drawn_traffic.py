@@ -9,18 +9,19 @@ import numpy as np
 
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings, Settings
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detectors import DetectorModel
 from vdet.labels.label import Label, SavedTracks
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.frame import Coding
 from vdet.run.loop import Parts, build, peek
 from vdet.run.result import FrameResult
 from vdet.run.steps import Step
-from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.render import STANDS, must_be_found, true_boxes
 from vdet.synthetic.scene import (
     LANE_WIDTH,
     LaneLine,
     Light,
+    PinholeCamera,
     Scene,
     SceneVehicle,
     Waypoint,
@@ -28,8 +29,6 @@ from vdet.synthetic.scene import (
     random_body,
     random_paint,
 )
-from vdet.synthetic.truth import must_be_found, true_boxes
-from vdet.synthetic.vehicle import STANDS
 from vdet.track.track import Track
 
 

@@ -27,8 +27,7 @@ from vdet.detect.svm.windows import Windows
 from vdet.evaluate.scores import score
 from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_truth
-from vdet.learn.svm.dataset import PatchFile, find_patches
-from vdet.learn.svm.extraction import extract
+from vdet.learn.svm.patches import PatchFile, extract, find_patches
 from vdet.learn.svm.training import fit, fit_boxes
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader

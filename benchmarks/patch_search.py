@@ -6,8 +6,7 @@ It is slow and simple. The tests and benchmarks compare the dense search with it
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.detect.svm.features import FeatureExtractor
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.model import FeatureExtractor, LinearModel
 from vdet.detect.svm.search import FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, WindowGrid
 

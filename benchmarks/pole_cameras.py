@@ -21,16 +21,15 @@ from benchmarks.drawn_traffic import follow
 from vdet.boxes import Float64Array
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.detect.factory import load_detector
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.ground import Ground, fit_ground
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.render import frames
+from vdet.synthetic.render import frames, true_boxes
 from vdet.synthetic.scene import (
     LANE_WIDTH,
     LORRY,
     Body,
+    PinholeCamera,
     Scene,
     SceneVehicle,
     Waypoint,
@@ -38,7 +37,6 @@ from vdet.synthetic.scene import (
     random_body,
     random_paint,
 )
-from vdet.synthetic.truth import true_boxes
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counting import count_frames
 from vdet.traffic.speeds import SpeedMeter

@@ -34,11 +34,11 @@ from vdet.review.strips import BandPassage, Passages, bands_of
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.render import Renderer
+from vdet.synthetic.render import Renderer, TrueBox, draw_vehicle, true_boxes
 from vdet.synthetic.scene import (
     LANE_WIDTH,
     LORRY,
+    PinholeCamera,
     Scene,
     SceneVehicle,
     Waypoint,
@@ -46,8 +46,6 @@ from vdet.synthetic.scene import (
     random_body,
     random_paint,
 )
-from vdet.synthetic.truth import TrueBox, true_boxes
-from vdet.synthetic.vehicle import draw_vehicle
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counts import Counts
 from vdet.traffic.live import LiveTraffic

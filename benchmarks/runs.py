@@ -20,8 +20,7 @@ from vdet.config.scene import (
     ZoneSettings,
 )
 from vdet.config.schema import DrawSettings, InputSettings, Settings, SvmSettings
-from vdet.detect.factory import load_detector
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.media.reader import VideoReader
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output

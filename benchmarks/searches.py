@@ -13,7 +13,7 @@ from benchmarks.material import ShippedConfig
 from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
-from vdet.detect.factory import load_detector
+from vdet.detect.detectors import load_detector
 from vdet.detect.svm.detector import SvmDetector
 from vdet.detect.svm.search import DenseSearch
 from vdet.media import Picture, Planes

@@ -18,8 +18,7 @@ from onnx import numpy_helper
 from benchmarks.unseen import OURS
 from vdet.config.classes import standard_class
 from vdet.detect.onnx.detector import SHIPPED
-from vdet.detect.onnx.recognition import Header, read_header
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import Header, Session, read_header
 from vdet.errors import DataError
 from vdet.learn.net.export import export_network, write_model
 

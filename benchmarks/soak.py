@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.material import find_video
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import OutputSettings, Settings
-from vdet.detect.factory import as_model
+from vdet.detect.detectors import as_model
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.loop import Parts

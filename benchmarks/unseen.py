@@ -24,21 +24,16 @@ from vdet.boxes import BoolArray, Float64Array, Image, Int64Array
 from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
-from vdet.detect.factory import load_detector
+from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.onnx.detector import NetworkDetector
-from vdet.detect.onnx.recognition import Header, ScoreCalibration, read_header
-from vdet.detect.onnx.session import Session
-from vdet.detect.protocol import DetectorModel
-from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame
-from vdet.evaluate.images import Counting, MeasuredImage, best_f1, evaluate_images
+from vdet.detect.onnx.network import Header, ScoreCalibration, Session, read_header
 from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.report import video_report
-from vdet.evaluate.scores import RankedPredictions
-from vdet.evaluate.video import evaluate_video
+from vdet.evaluate.results import Counting, MeasuredImage, best_f1, evaluate_images, evaluate_video
+from vdet.evaluate.scores import MATCH_IOU, ComparedFrame, RankedPredictions
 from vdet.files import json_text, write_whole
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.reading import read_labelled_images, read_truth
-from vdet.labels.roles import Roles
+from vdet.labels.reading import Roles, read_labelled_images, read_truth
 
 OURS = "trained without them"
 """The name of our networks in `results.json`."""

@@ -30,9 +30,8 @@ from vdet.conditions import visibility
 from vdet.conditions.visibility import PLAIN, probability
 from vdet.conditions.watch import planes_of
 from vdet.config.loading import load_settings
-from vdet.detect.factory import load_detector
+from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.onnx.detector import SHIPPED
-from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.output import table
 from vdet.files import json_text, write_whole
 from vdet.labels.images import LabelledImage

@@ -27,10 +27,8 @@ from vdet.config.schema import Settings
 from vdet.findings import Finding
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Scene, demo_scene, empty_road, pole_scene
-from vdet.synthetic.truth import true_boxes
+from vdet.synthetic.render import Renderer, true_boxes
+from vdet.synthetic.scene import PinholeCamera, Scene, demo_scene, empty_road, pole_scene
 from vdet.track.track import Track
 
 SIZE = 640, 360

@@ -12,9 +12,16 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
-from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import LANE_WIDTH, Body, Scene, SceneVehicle, Waypoint, empty_road
+from vdet.synthetic.scene import (
+    LANE_WIDTH,
+    Body,
+    PinholeCamera,
+    Scene,
+    SceneVehicle,
+    Waypoint,
+    empty_road,
+)
 
 FOLDER = Path(__file__).parent
 COUNTED_FRAME = 62  # of the demo's pole: half of the vehicles are counted

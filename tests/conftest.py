@@ -19,7 +19,7 @@ from running import Outcome
 from vdet.cli import main
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.model import save_model
-from vdet.learn.svm.dataset import find_patches
+from vdet.learn.svm.patches import find_patches
 from vdet.learn.svm.training import train
 from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Scene, demo_scene

@@ -11,14 +11,12 @@ import pytest
 from benchmarks.drawn_traffic import as_planes, follow, shown_labels, traffic_scene, true_labels
 
 from vdet.config.schema import Settings, SvmSettings
-from vdet.detect.factory import load_detector
-from vdet.detect.protocol import DetectorModel
-from vdet.detect.svm.horizon import find_horizon
+from vdet.detect.detectors import DetectorModel, load_detector
+from vdet.detect.svm.windows import find_horizon
 from vdet.evaluate.scores import score
 from vdet.run.loop import peek
-from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import frames
-from vdet.synthetic.scene import Light, Scene
+from vdet.synthetic.scene import Light, PinholeCamera, Scene
 
 LINEAR = Settings(detector=SvmSettings())
 FRAMES = 30

@@ -66,8 +66,8 @@ def test_libraries_use_one_thread_a_call() -> None:
             print(cv2.getNumThreads())
             return 0
         vdet.cli.main = show
-        from vdet.process import run
-        run()
+        from vdet.__main__ import main
+        main()
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split()[-1] == "1"
@@ -76,10 +76,10 @@ def test_libraries_use_one_thread_a_call() -> None:
 def test_a_signal_after_the_work_does_not_change_the_exit_code() -> None:
     code = """if True:
         import os, signal, sys
-        from vdet import process
-        process._exit = lambda _: os.kill(os.getpid(), signal.SIGTERM)
+        from vdet import __main__ as program
+        program._exit = lambda _: os.kill(os.getpid(), signal.SIGTERM)
         sys.argv = ["vdet", "--version"]
-        process.run()
+        program.main()
     """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

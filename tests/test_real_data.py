@@ -18,10 +18,8 @@ from seed import SEED
 from vdet.boxes import Box
 from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmModel, shipped_model
-from vdet.detect.svm.features import FeatureExtractor, resize
-from vdet.detect.svm.model import LinearModel, load_model
-from vdet.learn.svm.dataset import find_patches, read_patches
-from vdet.learn.svm.extraction import hold_out
+from vdet.detect.svm.model import FeatureExtractor, LinearModel, load_model, resize
+from vdet.learn.svm.patches import find_patches, hold_out, read_patches
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader

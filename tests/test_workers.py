@@ -71,14 +71,14 @@ def test_what_ended_processes_left_is_removed_without_a_word(tmp_path: Path) -> 
     code = f"""if True:
         import vdet.cli
         from joblib.externals.loky.backend import resource_tracker
-        from vdet.process import run
+        from vdet.__main__ import main
         from vdet.workers import LocalProcesses, call_all
         def work_in_processes():
             assert len(list(call_all(abs, [1, 2], LocalProcesses(2)))) == 2
             resource_tracker.register({str(tmp_path / "left")!r}, "file")
             return 0
         vdet.cli.main = work_in_processes
-        run()
+        main()
     """
     result = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True

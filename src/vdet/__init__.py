@@ -16,7 +16,7 @@ def __dir__() -> list[str]:
 
 
 _DEPRECATED = {
-    "DetectorModel": "vdet.detect.protocol",
+    "DetectorModel": "vdet.detect.detectors",
     "Event": "vdet.traffic.counts",
     "Frame": "vdet.media",
     "Output": "vdet.run.sinks",
@@ -24,7 +24,7 @@ _DEPRECATED = {
     "SinkContext": "vdet.run.sinks.protocol",
     "Step": "vdet.run.steps",
     "StepContext": "vdet.run.steps",
-    "VideoDetector": "vdet.detect.protocol",
+    "VideoDetector": "vdet.detect.detectors",
     "VideoTracker": "vdet.track.track",
 }
 """Names that vdet 1.0 exported, with their modules."""

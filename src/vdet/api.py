@@ -32,10 +32,10 @@ from vdet.config.kinds import DetectorKind, TrackerKind, kind_of_model
 from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
-from vdet.detect.factory import DetectorObject, as_model, load_detector
+from vdet.detect.detectors import DetectorObject, as_model, load_detector
 from vdet.errors import ArgumentError, ArgumentTypeError, ImageError, VdetError
+from vdet.evaluate.results import score_files
 from vdet.evaluate.scores import Scores
-from vdet.evaluate.video import score_files
 from vdet.files import OutputFiles, valid_text
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks, SourceVideo

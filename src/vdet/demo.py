@@ -15,15 +15,14 @@ from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
 from vdet.files import make_folder, write_whole
 from vdet.labels.reading import read_tracks, read_truth
-from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import MiningLimits, VideoSource, mine
+from vdet.learn.svm.patches import find_patches
 from vdet.learn.svm.training import train
 from vdet.progress import Progress
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
-from vdet.synthetic.render import write_clip
+from vdet.synthetic.render import write_clip, write_truth
 from vdet.synthetic.scene import Scene, busy_road, demo_scene, pole_scene
-from vdet.synthetic.truth import write_truth
 from vdet.traffic.counting import count_files
 
 ROADS = 6

@@ -13,7 +13,7 @@ import numpy as np
 
 from vdet.boxes import NO_BOXES, Boxes, Image, clipped
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detectors import DetectorModel
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.result import FrameResult, findings_in

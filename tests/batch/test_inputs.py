@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.batch.inputs import find_sources
+from vdet.batch.run import find_sources
 from vdet.errors import BatchError
 
 

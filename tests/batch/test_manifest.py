@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.batch.manifest import ManifestRecord, Written, open_manifest, read_batch
+from vdet.batch.task import ManifestRecord, Written, open_manifest, read_batch
 from vdet.errors import OutputError
 
 RECORD = ManifestRecord(

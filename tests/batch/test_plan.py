@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vdet.batch.manifest import ManifestRecord, Written, open_manifest
 from vdet.batch.run import Plan, make_plan
+from vdet.batch.task import ManifestRecord, Written, open_manifest
 from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import Output, data
 from vdet.run.sinks.protocol import BatchTotal, output_state

@@ -13,8 +13,7 @@ import pytest
 from red_cars import HEIGHT, WIDTH, red_settings
 from running import names, write_drive
 from vdet.batch.task import process_file, result_digest
-from vdet.detect.factory import load_detector
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.plugins import plugin_packages
 from vdet.run.sinks import Output
 from vdet.run.video import Run, write_outputs

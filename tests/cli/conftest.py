@@ -8,8 +8,8 @@ import pytest
 from red_cars import SETTINGS, red_finder
 from vdet.config.rendering import render_settings
 from vdet.detect.svm.model import save_model
+from vdet.synthetic.render import write_truth
 from vdet.synthetic.scene import Scene
-from vdet.synthetic.truth import write_truth
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import vdet
 from conftest import Run
 from running import frames_of, names, write_drive
 from vdet.config.schema import NetworkSettings
-from vdet.detect.factory import model_file
+from vdet.detect.detectors import model_file
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
 def test_with_strict_a_failed_file_decides_the_exit_code_before_a_doubtful_one(
     run: Run, clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vdet.batch.manifest.ManifestRecord.is_doubtful", True)
+    monkeypatch.setattr("vdet.batch.task.ManifestRecord.is_doubtful", True)
     arguments = ("detect-video", clips / "a.mp4", "--no-video", "--tracks", ".csv", "--strict")
     assert run(*arguments, "-d", tmp_path / "doubtful").code == 4
     (clips / "bad.mp4").write_bytes(b"no video")

@@ -61,6 +61,6 @@ def test_without_a_file_the_shipped_models_are_loaded(
     def fail(*_: object) -> NoReturn:
         raise ModelError("net.onnx: is damaged")
 
-    monkeypatch.setattr("vdet.detect.factory.load_detector", fail)
+    monkeypatch.setattr("vdet.detect.detectors.load_detector", fail)
     result = run("info")
     assert (result.code, result.err) == (1, "vdet: net.onnx: is damaged\n")

@@ -15,10 +15,10 @@ from labels.writers import exported
 from vdet.detect.svm.model import load_model
 from vdet.labels.label import boxes_of
 from vdet.labels.reading import read_truth
-from vdet.learn.svm.dataset import find_patches, read_patches
+from vdet.learn.svm.patches import find_patches, read_patches
 from vdet.media.reader import VideoReader
+from vdet.synthetic.render import write_truth
 from vdet.synthetic.scene import Scene
-from vdet.synthetic.truth import write_truth
 
 SETS = ", ".join(
     f"{{size: {size}, overlap: 0.875, top: {top}, bottom: {bottom}}}"

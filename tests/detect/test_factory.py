@@ -6,7 +6,7 @@ import pytest
 
 from vdet.config.kinds import DetectorSettings
 from vdet.config.schema import NetworkSettings, Settings, SvmSettings
-from vdet.detect.factory import load_detector, model_file
+from vdet.detect.detectors import load_detector, model_file
 from vdet.detect.onnx.detector import NetworkModel
 from vdet.detect.svm.detector import SvmModel, shipped_model
 from vdet.errors import ConfigError, ModelError

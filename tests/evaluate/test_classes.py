@@ -7,9 +7,8 @@ import numpy as np
 
 from evaluate.scenes import TEN, drive, video
 from vdet.boxes import Box, Boxes
-from vdet.evaluate.comparison import compare
-from vdet.evaluate.images import Counting, MeasuredImage
-from vdet.evaluate.scores import ClassResult, class_results
+from vdet.evaluate.results import Counting, MeasuredImage
+from vdet.evaluate.scores import ClassResult, class_results, compare
 from vdet.labels.images import LabelledImage
 from vdet.labels.label import Label
 from vdet.track.track import Track

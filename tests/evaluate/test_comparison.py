@@ -2,8 +2,7 @@ import pytest
 
 from evaluate.scenes import TEN, drive, video
 from labels.saving import row
-from vdet.evaluate.comparison import compare, pool
-from vdet.evaluate.scores import score_comparison
+from vdet.evaluate.scores import compare, pool, score_comparison
 from vdet.labels.label import NO_ID, Label
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from labels.saving import checked_video, row
-from vdet.evaluate.comparison import compare, pool
-from vdet.evaluate.scores import score, score_comparison
+from vdet.evaluate.scores import compare, pool, score, score_comparison
 from vdet.labels.label import SavedTracks
 
 CASES = sorted(Path(__file__).parent.glob("golden/*.json"))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.boxes import Box, Boxes
-from vdet.evaluate.images import (
+from vdet.evaluate.results import (
     Counting,
     ImageScores,
     ImagesResult,

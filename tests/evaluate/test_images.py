@@ -11,7 +11,7 @@ from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.boxes import Box
 from vdet.detect.svm.detector import SvmModel
 from vdet.errors import ImageError
-from vdet.evaluate.images import Counting, evaluate_images
+from vdet.evaluate.results import Counting, evaluate_images
 from vdet.labels.images import LabelledImages
 from vdet.labels.reading import read_labelled_images
 

@@ -10,8 +10,6 @@ from labels.saving import checked_video, row
 from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
 from vdet.boxes import Box, Boxes
-from vdet.evaluate.comparison import compare
-from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, MeasuredSet
 from vdet.evaluate.output import RunName
 from vdet.evaluate.report import (
     DETECTED,
@@ -22,7 +20,15 @@ from vdet.evaluate.report import (
     video_report,
     worst_tiles,
 )
-from vdet.evaluate.video import ClipResult, score_files
+from vdet.evaluate.results import (
+    ClipResult,
+    Counting,
+    ImagesResult,
+    MeasuredImage,
+    MeasuredSet,
+    score_files,
+)
+from vdet.evaluate.scores import compare
 from vdet.labels.label import Label
 from vdet.labels.reading import read_labelled_images
 

@@ -8,13 +8,13 @@ import pytest
 
 from quick import QUICK
 from vdet.config.loading import load_settings
-from vdet.detect.factory import load_detector
+from vdet.detect.detectors import load_detector
 from vdet.errors import TruthError
-from vdet.evaluate.video import ClipResult, evaluate_video
+from vdet.evaluate.results import ClipResult, evaluate_video
 from vdet.labels.reading import read_truth
 from vdet.progress import Progress, no_progress
+from vdet.synthetic.render import write_truth
 from vdet.synthetic.scene import Scene
-from vdet.synthetic.truth import write_truth
 
 FRAMES = 10
 Evaluate = Callable[..., ClipResult]

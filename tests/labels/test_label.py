@@ -8,8 +8,7 @@ import pytest
 
 from labels.saving import checked_video, row
 from vdet.errors import TruthError
-from vdet.labels.label import NO_ID, Label, SavedTracks, SourceVideo
-from vdet.labels.parsing import numbered_lines
+from vdet.labels.label import NO_ID, Label, SavedTracks, SourceVideo, numbered_lines
 
 
 def test_until_keeps_the_frames_up_to_the_last() -> None:

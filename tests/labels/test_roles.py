@@ -4,7 +4,7 @@ import pytest
 
 from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.loading import load_settings
-from vdet.labels.roles import DEFAULT_ROLES, Roles
+from vdet.labels.reading import DEFAULT_ROLES, Roles
 
 
 @pytest.mark.parametrize(

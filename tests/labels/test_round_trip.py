@@ -16,8 +16,9 @@ from vdet.boxes import Box
 from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images, write_coco_images
-from vdet.labels.formats import Format, ImageTracks, track_formats
-from vdet.labels.label import SavedTracks
+from vdet.labels.formats import Format, track_formats
+from vdet.labels.images import LabelledImage
+from vdet.labels.label import Label, SavedTracks
 from vdet.labels.lines import CSV, JSON_LINES, MOT
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image
@@ -137,17 +138,18 @@ def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
 
 
 @st.composite
-def labelled(draw: st.DrawFn) -> list[ImageTracks]:
+def labelled(draw: st.DrawFn) -> list[LabelledImage]:
     """Give pictures with boxes, some in folders; no two boxes of one are the same."""
     names = st.sampled_from(["a.png", "b/a.png", "b/c d/é & <e>.jpg", "b/2.jpg"])
     return [
-        ImageTracks(
+        LabelledImage(
             Path(name),
-            (VIDEO.width, VIDEO.height),
-            [
-                replace(car(number, box), class_name=draw(CLASSES))
+            Path(),
+            tuple(
+                Label(replace(car(number, box), class_name=draw(CLASSES)))
                 for number, box in enumerate(draw(st.sets(boxes(), max_size=4)), start=1)
-            ],
+            ),
+            (VIDEO.width, VIDEO.height),
         )
         for name in sorted(draw(st.sets(names, min_size=1)))
     ]
@@ -155,7 +157,7 @@ def labelled(draw: st.DrawFn) -> list[ImageTracks]:
 
 @settings(max_examples=20)
 @given(pictures=labelled())
-def test_labels_of_pictures_are_read_again(pictures: list[ImageTracks]) -> None:
+def test_labels_of_pictures_are_read_again(pictures: list[LabelledImage]) -> None:
     with TemporaryDirectory() as name:
         folder = Path(name)
         path, images = folder / "set.coco.json", folder / "images"
@@ -165,16 +167,14 @@ def test_labels_of_pictures_are_read_again(pictures: list[ImageTracks]) -> None:
         with path.open("wb") as file:
             write_coco_images(file, pictures)
         found = list(read_coco_images(path))
-    expected = {
-        images / picture.path: sorted(
-            (track.box.pixels, track.class_name or UNKNOWN) for track in picture.tracks
-        )
-        for picture in pictures
-    }
-    read = {
-        picture.path: sorted(
-            (label.track.box.pixels, label.track.class_name) for label in picture.labels
-        )
-        for picture in found
-    }
-    assert read == expected
+
+    def boxes_by_path(labelled: list[LabelledImage], base: Path) -> dict[Path, object]:
+        return {
+            base / image.path: sorted(
+                (label.track.box.pixels, label.track.class_name or UNKNOWN)
+                for label in image.labels
+            )
+            for image in labelled
+        }
+
+    assert boxes_by_path(found, Path()) == boxes_by_path(pictures, images)

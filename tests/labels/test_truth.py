@@ -6,8 +6,8 @@ from labels.saving import car, checked_video, frame, row, written
 from labels.writers import exported
 from vdet.boxes import Box
 from vdet.errors import TruthError
-from vdet.evaluate.comparison import compare
-from vdet.evaluate.video import score_files
+from vdet.evaluate.results import score_files
+from vdet.evaluate.scores import compare
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.lines import MOT as MOT_FORMAT
 from vdet.labels.reading import read_truth

@@ -5,9 +5,8 @@ from benchmarks.drawn_traffic import lane_view
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
-from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Carriageway, LaneLine, Light, Scene
+from vdet.synthetic.scene import Carriageway, LaneLine, Light, PinholeCamera, Scene
 
 YELLOW = (60, 180, 225)
 

@@ -8,10 +8,8 @@ from benchmarks.distances import FARTHEST, RIGHT, Drive, Sample, by_true_boxes
 from benchmarks.drawn_traffic import traffic_scene
 
 from vdet.media import Picture
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import true_boxes
+from vdet.synthetic.render import Renderer, true_boxes
+from vdet.synthetic.scene import PinholeCamera, Scene, SceneVehicle, Waypoint
 
 FRAMES = 14
 SETTLED = 4

@@ -27,9 +27,8 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
-from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Scene
+from vdet.synthetic.scene import PinholeCamera, Scene
 from writing import write_image
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10

@@ -16,8 +16,8 @@ from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import Road, RoadFinder, RoadPosition, position_on_road
 from vdet.media import Picture
 from vdet.run.steps import with_positions
-from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import PinholeCamera
 from vdet.track.track import Track
 
 CAMERA = PinholeCamera.dashboard(1280, 720)

@@ -13,9 +13,8 @@ from vdet.boxes import Float64Array, Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import CARRY, Lane, RoadFinder
 from vdet.media import Picture
-from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import LaneLine, Light, Shadow
+from vdet.synthetic.scene import LaneLine, Light, PinholeCamera, Shadow
 
 SHADOWS = tuple(
     Shadow(station, 8.0, 0.45, dappled)

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from lanes.roads import settings_for
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import TopView
-from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.scene import PinholeCamera
 
 CAMERA = PinholeCamera.dashboard(1280, 720)
 

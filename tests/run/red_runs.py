@@ -9,7 +9,7 @@ from typing import Any
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.config.schema import Settings
-from vdet.detect.protocol import StageImages
+from vdet.detect.detectors import StageImages
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
 from vdet.findings import Findings

@@ -12,9 +12,10 @@ import pytest
 from boxing import moved_to
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, drive, road
 from run.red_runs import follow, write
+from vdet.boxes import Float32Array
 from vdet.config.schema import MotionTrackerSettings, NetworkSettings, SvmSettings
 from vdet.detect.onnx.detector import NetworkDetector
-from vdet.detect.onnx.recognition import InputForm, RawBoxes, Recognized
+from vdet.detect.onnx.network import InputForm, Recognized
 from vdet.errors import ModelError, OutputError
 from vdet.media import Frame, Picture
 from vdet.run.loop import Pipeline
@@ -86,11 +87,10 @@ class RedNetwork:
 
     form, is_named = InputForm(WIDTH, HEIGHT), True
 
-    def find(self, picture: Picture, _: float) -> RawBoxes:
+    def find(self, picture: Picture, _: float) -> Float32Array:
         y, x = np.nonzero(picture.image[..., 2] > 2 * picture.image[..., 0].astype(int))
-        boxes = [(x.min(), y.min(), x.max() + 1, y.max() + 1)] if x.size else []
-        sides = np.array(boxes, np.float32).reshape(-1, 4)
-        return RawBoxes(sides, np.full(len(boxes), 0.9, np.float32), np.zeros(len(boxes), np.int32))
+        rows = [(x.min(), y.min(), x.max() + 1, y.max() + 1, 0.9, 0)] if x.size else []
+        return np.array(rows, np.float32).reshape(-1, 6)
 
 
 def searched_by_network(
@@ -135,9 +135,9 @@ class TestWhereNothingMoves:
     ) -> None:
         find = RedNetwork.find
 
-        def fail_on_cars(network: RedNetwork, picture: Picture, minimum: float) -> RawBoxes:
+        def fail_on_cars(network: RedNetwork, picture: Picture, minimum: float) -> Float32Array:
             found = find(network, picture, minimum)
-            if len(found.sides):
+            if len(found):
                 raise ModelError("shows a car")
             return found
 

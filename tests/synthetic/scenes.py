@@ -1,7 +1,14 @@
 """Small scenes without noise and shadows, on a plain road."""
 
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.scene import Carriageway, LaneLine, Light, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import (
+    Carriageway,
+    LaneLine,
+    Light,
+    PinholeCamera,
+    Scene,
+    SceneVehicle,
+    Waypoint,
+)
 
 
 def make_scene(

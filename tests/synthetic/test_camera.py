@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near
+from vdet.synthetic.scene import NEAR, PinholeCamera, beyond_near
 
 metres = st.floats(-50, 50)
 

@@ -6,9 +6,8 @@ import pytest
 
 from synthetic.scenes import make_scene, parked
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import frames, write_clip
+from vdet.synthetic.render import frames, true_boxes, write_clip, write_truth
 from vdet.synthetic.scene import Scene
-from vdet.synthetic.truth import true_boxes, write_truth
 
 
 @pytest.fixture

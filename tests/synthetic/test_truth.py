@@ -9,10 +9,8 @@ from benchmarks.drawn_traffic import true_places
 
 from synthetic.scenes import make_scene, parked
 from vdet.boxes import Box
-from vdet.synthetic.render import Renderer
+from vdet.synthetic.render import STANDS, Renderer, TrueBox, must_be_found, true_boxes
 from vdet.synthetic.scene import Scene, Waypoint
-from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
-from vdet.synthetic.vehicle import STANDS
 
 SIZES = [(1280, 720), (640, 360), (1242, 375)]
 

@@ -68,7 +68,7 @@ def count(
       vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min
       vdet count day/*.jsonl -c gate.yaml --counts day.xlsx --page day
     """
-    from vdet.batch.manifest import MANIFEST
+    from vdet.batch.task import MANIFEST
 
     if len(tracks) > 1:  # by a pattern such as found/*.jsonl
         tracks = tuple(path for path in tracks if path.name != MANIFEST)

@@ -63,7 +63,7 @@ def detect_image(
     settings = source.load()
     if settings.lack_of_metres:
         announce(f"vdet: note: {settings.lack_of_metres}")
-    from vdet.detect.factory import load_detector
+    from vdet.detect.detectors import load_detector
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images
     from vdet.run.sinks.protocol import STANDARD_OUTPUT, check_sinks
 

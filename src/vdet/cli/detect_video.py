@@ -19,7 +19,7 @@ from vdet.run.sinks import Output
 from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 if TYPE_CHECKING:
-    from vdet.batch.manifest import ManifestRecord
+    from vdet.batch.task import ManifestRecord
     from vdet.run.video import Run
 
 STAGE_MARGIN = Fraction(2)
@@ -217,7 +217,7 @@ def _drawn_video(paths: Sequence[Path], *, is_only: bool) -> Path:
 
 def _beside(source: Path) -> Path:
     """Return the name of the video that is written without any output option."""
-    from vdet.batch.inputs import DRAWN
+    from vdet.batch.run import DRAWN
     from vdet.run.sinks.protocol import sink_kind
 
     return source.with_name(f"{source.stem}{DRAWN}{sink_kind('video').endings[0]}")

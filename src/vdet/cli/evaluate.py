@@ -42,11 +42,10 @@ def images(
     """
     settings = source.load()
     options.reject_regions(settings)
-    from vdet.detect.factory import load_detector
-    from vdet.evaluate.images import Counting, evaluate_images
+    from vdet.detect.detectors import load_detector
     from vdet.evaluate.report import images_report
-    from vdet.labels.reading import read_labelled_images
-    from vdet.labels.roles import Roles
+    from vdet.evaluate.results import Counting, evaluate_images
+    from vdet.labels.reading import Roles, read_labelled_images
 
     detector = load_detector(settings.detector.showing_all())
     roles = Roles.from_settings(settings)
@@ -79,7 +78,7 @@ def tracks(
       vdet eval tracks out.txt gt.txt --page page
     """
     from vdet.evaluate.report import tracks_report
-    from vdet.evaluate.video import score_files
+    from vdet.evaluate.results import score_files
 
     results.check(source.inputs(prediction, truth))
     settings = source.load()
@@ -115,11 +114,10 @@ def video(
     """
     labelled = options.with_truths(videos, truths)
     settings = source.load()
-    from vdet.detect.factory import load_detector
+    from vdet.detect.detectors import load_detector
     from vdet.evaluate.report import video_report
-    from vdet.evaluate.video import evaluate_video
-    from vdet.labels.reading import read_truth
-    from vdet.labels.roles import Roles
+    from vdet.evaluate.results import evaluate_video
+    from vdet.labels.reading import Roles, read_truth
 
     detector = load_detector(settings.detector)
     results.check(source.inputs(*videos, *truths, settings=settings))
@@ -158,7 +156,7 @@ def counts(events: Path, truth: Path, results: ResultFiles) -> None:
 
 def _run_name(settings: "Settings", source: SettingsSource) -> "RunName":
     """Return a description of the detector that is measured."""
-    from vdet.detect.factory import model_file
+    from vdet.detect.detectors import model_file
     from vdet.evaluate.output import RunName
 
     detector, configs = settings.detector, " ".join(source.configs) or None

@@ -67,7 +67,7 @@ def _model(path: Path) -> Facts:
 def _machine() -> Facts:
     """Load the shipped models; any error of that is one of the installation."""
     from vdet.config.loading import load_settings, shipped_configs
-    from vdet.detect.factory import load_detector
+    from vdet.detect.detectors import load_detector
     from vdet.detect.onnx.detector import SHIPPED
 
     configs = shipped_configs()
@@ -125,8 +125,7 @@ def _linear_model(path: Path) -> Facts:
 
 def _network(path: Path) -> Facts:
     from vdet.config.classes import standard_class
-    from vdet.detect.onnx.recognition import recognize
-    from vdet.detect.onnx.session import Session
+    from vdet.detect.onnx.network import Session, recognize
 
     network = recognize(Session(path)).for_frames(1280, 720)
     return {

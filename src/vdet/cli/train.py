@@ -39,7 +39,7 @@ def train(
     files = OutputFiles(overwrite=overwrite, inputs=source.inputs(*data))
     files.check(output, suffixes=(".npz",), noun="models")
     from vdet.detect.svm.model import save_model
-    from vdet.learn.svm.dataset import find_patches
+    from vdet.learn.svm.patches import find_patches
     from vdet.learn.svm.training import train as fit_model
 
     patches = find_patches(data)
@@ -157,8 +157,7 @@ def train_net(
     with needing("train"):
         from vdet.learn.net.sources import clip_source, image_source
         from vdet.learn.net.training import train_to_file
-    from vdet.labels.reading import read_labelled_images
-    from vdet.labels.roles import Roles
+    from vdet.labels.reading import Roles, read_labelled_images
 
     limit_library_threads()
     roles = Roles.for_training(settings)

@@ -13,11 +13,9 @@ from vdet.boxes import Box, Float64Array, Image
 from vdet.config.schema import InputSettings
 from vdet.draw.boxes import Color
 from vdet.errors import printable, quantity
-from vdet.evaluate.comparison import ComparedFrame, Comparison
-from vdet.evaluate.images import ImagesResult, MeasuredSet
 from vdet.evaluate.output import RunName, figure, table
-from vdet.evaluate.scores import ClassResult, class_results, score_boxes
-from vdet.evaluate.video import ClipResult, total
+from vdet.evaluate.results import ClipResult, ImagesResult, MeasuredSet, total
+from vdet.evaluate.scores import ClassResult, ComparedFrame, Comparison, class_results, score_boxes
 from vdet.media.reader import VideoReader
 from vdet.pages.render import render
 from vdet.version import __version__

@@ -28,17 +28,22 @@ from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.files import valid_text
-from vdet.labels.formats import Format, ImageTracks, last_classes
+from vdet.labels.formats import Format, last_classes
 from vdet.labels.images import LabelledImage, image_names, inside_set
-from vdet.labels.label import NO_ID, Label, SavedTracks, Size, SourceVideo, line_error
-from vdet.labels.parsing import (
+from vdet.labels.label import (
     LIMIT,
+    NO_ID,
     Index,
+    Label,
     Number,
+    SavedTracks,
+    Size,
+    SourceVideo,
     Times,
     checked_times,
     first_mistake,
     frame_number,
+    line_error,
     read_bytes,
 )
 from vdet.track.track import FrameTracks, Track
@@ -107,17 +112,16 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     writer.end(file)
 
 
-def write_coco_images(file: BinaryIO, images: Sequence[ImageTracks]) -> None:
-    """Write the vehicles in images; their paths are their names in the file."""
+def write_coco_images(file: BinaryIO, images: Sequence[LabelledImage]) -> None:
+    """Write the vehicles in images of known sizes, whose paths are their names in the file."""
     writer = _Writer("images")
     for number, image in enumerate(images, start=1):
+        assert image.size
         (width, height), name = image.size, valid_text(image.path.as_posix())
         writer.add("images", id=number, file_name=name, width=width, height=height)
-        for track in image.tracks:
+        for track in (label.track for label in image.labels):
             category = writer.category(track.class_name or UNKNOWN)
             writer.add_box(number, track.box, category, track.score)
-        for box in image.ignored:
-            writer.add_box(number, box, writer.category("ignore region"), 1.0, iscrowd=1)
     writer.end(file)
 
 

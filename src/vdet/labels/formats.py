@@ -9,28 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import OutputError, TruthError
 from vdet.findings import Finding
-from vdet.labels.label import SavedTracks, Size, SourceVideo
-from vdet.labels.parsing import numbered_lines
+from vdet.labels.label import SavedTracks, SourceVideo, numbered_lines
 from vdet.plugins import FORMATS, load_plugin, plugin_names
-from vdet.track.track import FrameTracks, Track
-
-
-@dataclass(frozen=True, slots=True)
-class ImageTracks:
-    """The vehicles in a single image.
-
-    `path` is its name in the file of labels, `size` its width and height in pixels. `ignored` are
-    ignore regions.
-    """
-
-    path: Path
-    size: Size
-    tracks: Sequence[Track]
-    ignored: Sequence[Box] = ()
+from vdet.track.track import FrameTracks
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,28 +1,34 @@
-"""Labelled images: their values, and the checks for every format."""
+"""Labelled images, the files that a label file names, and the format YOLO.
 
-import logging
-import math
+YOLO has a text file of labels for each image, and `data.yaml` with the classes. A line has the
+number of a class, and the centre (x, y), width and height of the box as fractions of the image, or
+the points of a polygon. Source: docs.ultralytics.com, "Object detection datasets overview".
+"""
+
 import os
 import re
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, unquote_plus
 
+import numpy as np
+
 from vdet.boxes import Box, Image
-from vdet.errors import ImageError, TruthError, printable, quantity
-from vdet.labels.label import Label, Size, line_error, mistake_in_box
-from vdet.labels.roles import DEFAULT_ROLES, Roles
-from vdet.media.images import read_image
-
-_PERCENT = 100
-"""If all boxes end below it, in images more than twice as large, they are probably percent."""
-_SLACK = 0.1
-"""How far a box may extend beyond a side of the image, as a fraction of it."""
-
-_log = logging.getLogger("vdet")
+from vdet.config.loading import parse_document
+from vdet.errors import ConfigError, ImageError, TruthError, printable
+from vdet.files import is_hidden
+from vdet.labels.label import (
+    NO_ID,
+    Label,
+    Size,
+    line_error,
+    numbered_lines,
+    read_bytes,
+)
+from vdet.media.images import is_image_name, read_header, read_image
+from vdet.track.track import Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,90 +85,6 @@ class LabelledImages:
     ignored: Mapping[str, int] = field(default_factory=dict)
 
 
-def checked_images(
-    name: str, images: Iterable[LabelledImage], roles: Roles = DEFAULT_ROLES
-) -> LabelledImages:
-    """Check the labels of a set, and omit the labels that are not vehicles.
-
-    A duplicate label in an image counts once, with a warning.
-
-    Raises
-    ------
-    TruthError
-        There is no image, an image is missing or appears twice, a box has no area, or most boxes
-        cannot be pixels of their images.
-    """
-    checked: dict[Path, LabelledImage] = {}
-    omitted, ignored = Counter[str](), Counter[str]()
-    boxes = repeated = absurd = 0
-    farthest, smallest = 0.0, math.inf
-    for image in images:
-        labels = tuple(
-            {
-                (label.track.box, label.track.class_name, label.ignored): label
-                for label in image.labels
-            }.values()
-        )
-        boxes += len(labels)
-        repeated += len(image.labels) - len(labels)
-        absurd += sum(_is_absurd(label.track.box, image.size) for label in labels)
-        farthest = max([farthest, *(max(astuple(label.track.box)) for label in labels)])
-        smallest = min(smallest, *(image.size or (0,)))
-        if image.path in checked:
-            raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
-        checked[image.path] = replace(
-            image,
-            labels=tuple(_with_roles(replace(image, labels=labels), roles, omitted, ignored)),
-            unlabelled=tuple(filter(None, map(roles.class_of, image.unlabelled))),
-        )
-    if not checked:
-        raise TruthError(f"{name}: has no labelled images")
-    if absurd > boxes / 2:
-        raise TruthError(
-            f"{name}: {absurd} of {quantity(boxes, 'box')} are outside their images or within a "
-            "pixel; the numbers must be in the unit of the format"
-        )
-    if 0 < farthest <= _PERCENT < smallest / 2:
-        _log.warning(
-            "%s: no box reaches beyond pixel 100; if these are percent, convert them", name
-        )
-    if repeated:
-        duplicates = quantity(repeated, "label")
-        _log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
-    return LabelledImages(
-        name, tuple(checked.values()), dict(omitted.most_common()), dict(ignored.most_common())
-    )
-
-
-def _is_absurd(box: Box, size: Size | None) -> bool:
-    """Return whether a box cannot be in pixels: it has fractions, or two corners for its size."""
-    width, height = size or (math.inf, math.inf)
-    slack_x, slack_y = _SLACK * width, _SLACK * height
-    reaches_left = box.x1 < -slack_x or box.y1 < -slack_y
-    reaches_right = box.x2 > width + slack_x or box.y2 > height + slack_y
-    return reaches_left or reaches_right or max(box.x2, box.y2) <= 1
-
-
-def _with_roles(
-    image: LabelledImage, roles: Roles, omitted: Counter[str], ignored: Counter[str]
-) -> Iterator[Label]:
-    """Yield the vehicles and ignore regions of an image, and count the other labels."""
-    if not is_file(image.path):
-        raise TruthError(f"{printable(str(image.path))}: not found, but {image.file} labels it")
-    for label in image.labels:
-        name = label.track.class_name or ""
-        role = roles.role_of(name)
-        if role not in ("vehicle", "ignored"):
-            omitted[name] += 1
-            continue
-        if mistake := mistake_in_box(label.track.box):
-            raise line_error(image.file, label.position, mistake)
-        ignored.update([name] if role == "ignored" and not label.ignored else [])
-        is_ignored = label.ignored or role == "ignored"
-        named = label.named(roles.class_of(name) or "vehicle")
-        yield named._replace(ignored=is_ignored)
-
-
 def is_file(path: Path) -> bool:
     """Return whether a file exists; False if its name is too long."""
     return os.path.isfile(path)  # noqa: PTH113  # the method of `Path` raises
@@ -216,3 +138,89 @@ def image_folder(path: Path, names: Sequence[str]) -> Path:
         if folders:
             return folders[0]
     raise TruthError(f"{path}: its first image, {shown}, was not found beside it or below")
+
+
+_DATA = "data.yaml"
+_COLUMNS = 5
+_MIN_POLYGON = 7  # columns: the class and three points
+
+
+def _class_names(path: Path) -> dict[float, str]:
+    """Return the names of the classes in `data.yaml` by their numbers."""
+    try:
+        values = parse_document(read_bytes(path).decode("utf-8-sig", "replace"), str(path)).values
+    except ConfigError as error:
+        raise TruthError(error.args[0]) from error
+    names = values.get("names")
+    if isinstance(names, dict):  # number: name
+        names = [names.get(str(number)) for number in range(len(names))]
+    if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
+        raise TruthError(f"{path}: names must be a list with all classes, or number them from 0")
+    return {float(number): name for number, name in enumerate(names)}
+
+
+def _labels(path: Path, names: Mapping[float, str], size: Size) -> Iterator[Label]:
+    """Yield the label of each line: a box, or a polygon with three points or more, as its box.
+
+    Points less than a pixel outside the image are moved to its side.
+    """
+    for line, content in numbered_lines(path, read_bytes(path)):
+        try:
+            number, *fractions = map(float, content.split())
+        except ValueError as error:
+            raise line_error(path, line, str(error)) from error
+        count = 1 + len(fractions)
+        if count != _COLUMNS and (count < _MIN_POLYGON or count % 2 == 0):
+            message = f"{_COLUMNS} columns, or the points of a polygon; this line has {count}"
+            raise line_error(path, line, f"YOLO has {message}")
+        name = names.get(number)
+        if name is None:
+            message = f"class {number:g} has no name; {_DATA} has {len(names)} names"
+            raise line_error(path, line, message)
+        points = np.array(fractions).reshape(-1, 2) * size
+        if not np.all((points >= -1) & (points <= np.add(size, 1))):
+            message = "a number is not between 0 and 1; YOLO uses fractions of the image"
+            raise line_error(path, line, message)
+        points = points.clip(0, size)
+        if count == _COLUMNS:
+            middle, sides = points
+            points = np.array([middle - sides / 2, middle + sides / 2])
+        (x1, y1), (x2, y2) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+        yield Label(Track(NO_ID, Box(x1, y1, x2, y2), 1.0, "detected", name), line)
+
+
+def read_yolo_images(images: Path, labels: Path) -> Iterator[LabelledImage]:
+    """Yield the images of a set; one without a label file of its name shows no vehicle.
+
+    Hidden files and files of the system or of label tools are skipped.
+
+    Raises
+    ------
+    TruthError
+        `data.yaml` is missing in the folder of the set and above it, an image cannot be read, a
+        line is invalid, or, at the end, a label file has no image of its name.
+    """
+    folder = images.parent
+    data = next((p for p in (folder / _DATA, folder.parent / _DATA) if p.is_file()), None)
+    if data is None:
+        raise TruthError(f"{folder}: needs {_DATA} with the names of the classes, here or above")
+    names = _class_names(data)
+    files = {
+        file.relative_to(labels).with_suffix(""): file
+        for file in labels.rglob("*.txt")
+        if file.is_file()  # a FIFO may never end
+        and not is_hidden(file.relative_to(labels))
+        and file.name != "classes.txt"
+    }
+    for image in sorted(filter(is_image_name, images.rglob("*"))):
+        file = files.pop(image.relative_to(images).with_suffix(""), None)
+        if file is None:
+            yield LabelledImage(image, image)
+            continue
+        try:
+            size, _ = read_header(image)
+        except ImageError as error:
+            raise TruthError(str(error)) from error
+        yield LabelledImage(image, file, tuple(_labels(file, names, size)), size)
+    if files:
+        raise TruthError(f"{min(files.values())}: has no image of its name below {images}")

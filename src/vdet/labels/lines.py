@@ -25,14 +25,17 @@ from vdet.errors import TruthError
 from vdet.files import json_line
 from vdet.findings import Finding
 from vdet.labels.formats import VIDEO, Format
-from vdet.labels.label import Label, SavedTracks, SourceVideo, line_error
-from vdet.labels.parsing import (
+from vdet.labels.label import (
     LIMIT,
     Index,
+    Label,
     Number,
+    SavedTracks,
+    SourceVideo,
     Times,
     checked_times,
     first_mistake,
+    line_error,
     numbered_lines,
 )
 from vdet.track.track import FrameTracks, State, Track

@@ -1,23 +1,117 @@
-"""Readers of tracks, predictions, ground truth and labelled images in any format."""
+"""Readers of tracks, ground truth and labelled images in any format, and the roles of labels.
+
+A labelled box is a vehicle, an ignore region, or neither: its role in evaluation and training.
+"""
 
 import gc
 import logging
+import math
 import re
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
+from typing import Self
 
-from vdet.errors import TruthError
+from vdet.boxes import Box
+from vdet.config.classes import STANDARD_CLASSES, letters, standard_class
+from vdet.config.schema import Role, Settings
+from vdet.errors import TruthError, printable, quantity
 from vdet.files import is_hidden
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
-from vdet.labels.images import LabelledImage, LabelledImages, checked_images
-from vdet.labels.label import NO_ID, Label, SavedTracks, Size, checked_labels, line_error
+from vdet.labels.images import LabelledImage, LabelledImages, is_file, read_yolo_images
+from vdet.labels.label import (
+    NO_ID,
+    Label,
+    SavedTracks,
+    Size,
+    checked_labels,
+    line_error,
+    mistake_in_box,
+    read_bytes,
+)
 from vdet.labels.lines import MOT
-from vdet.labels.parsing import read_bytes
-from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
-from vdet.labels.yolo import read_yolo_images
+
+_IGNORED = ("tram", "train", "misc", "trailer", "caravan", "rider")
+_REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
+_REGION_LETTERS = tuple(dict.fromkeys(map(letters, _REGIONS)))
+_ANY_KIND = ("car", "truck", "bus")  # included in the class "vehicle" of a detector
+
+
+def _key(word: str) -> str:
+    """Return the class of a word, else its letters."""
+    return standard_class(word) or letters(word)
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """The meaning of labels; case, spaces and punctuation do not matter.
+
+    Attributes
+    ----------
+    words
+        The role of each known word.
+    classes
+        The class by the letters of its name.
+    """
+
+    words: Mapping[str, Role]
+    classes: Mapping[str, str]
+
+    @classmethod
+    def of(cls, roles: Mapping[str, Role], classes: Sequence[str]) -> Self:
+        """Return the roles of words; a class without a role is a vehicle if it is in `classes`.
+
+        Other known classes are ignored. A class in `classes` with the role "other" is also ignored:
+        the detector finds it, so it is not background.
+        """
+        words: dict[str, Role] = dict.fromkeys((*STANDARD_CLASSES, *map(_key, _IGNORED)), "ignored")
+        words.update(dict.fromkeys(map(_key, classes), "vehicle"))
+        for word, role in roles.items():
+            is_detected = words.get(_key(word)) == "vehicle"
+            words[_key(word)] = "ignored" if is_detected and role == "other" else role
+        words.update(dict.fromkeys(_REGION_LETTERS, "ignored"))
+        return cls(words, {letters(name): name for name in classes})
+
+    @classmethod
+    def from_settings(cls, settings: Settings) -> Self:
+        """Return the roles by `labels.roles` and the classes of the detector.
+
+        The class "vehicle" includes cars, trucks and buses.
+        """
+        classes = settings.detector.vehicle_classes
+        any_kind = _ANY_KIND if "vehicle" in classes else ()
+        return cls.of(settings.labels.roles, (*classes, *any_kind))
+
+    @classmethod
+    def for_training(cls, settings: Settings) -> Self:
+        """Return the roles by `labels.roles` and the classes that a network learns.
+
+        Vehicles of unknown kind are learnt if the network learns cars, trucks or buses.
+        """
+        classes = settings.train.net.classes
+        any_kind = () if set(_ANY_KIND).isdisjoint(classes) else ("vehicle",)
+        return cls.of(settings.labels.roles, (*classes, *any_kind))
+
+    def role_of(self, label: str) -> Role | None:
+        """Return the role of a label; None if it is unknown."""
+        return self.words.get(_key(label))
+
+    def class_of(self, label: str) -> str | None:
+        """Return the class of a label; None if it has none."""
+        return self.classes.get(letters(label)) or standard_class(label)
+
+
+DEFAULT_ROLES = Roles.from_settings(Settings())
+"""The roles of the default settings."""
+
+
+def is_region(label: str | None) -> bool:
+    """Return whether a label marks a region, not a single object."""
+    return label is not None and letters(label) in _REGION_LETTERS
+
 
 _log = logging.getLogger("vdet")
 
@@ -156,6 +250,96 @@ def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledIm
         There is no labelled set, or it has a mistake; the message names its position.
     """
     return checked_images(str(path), _images(path), roles)
+
+
+_PERCENT = 100
+"""If all boxes end below it, in images more than twice as large, they are probably percent."""
+_SLACK = 0.1
+"""How far a box may extend beyond a side of the image, as a fraction of it."""
+
+
+def checked_images(
+    name: str, images: Iterable[LabelledImage], roles: Roles = DEFAULT_ROLES
+) -> LabelledImages:
+    """Check the labels of a set, and omit the labels that are not vehicles.
+
+    A duplicate label in an image counts once, with a warning.
+
+    Raises
+    ------
+    TruthError
+        There is no image, an image is missing or appears twice, a box has no area, or most boxes
+        cannot be pixels of their images.
+    """
+    checked: dict[Path, LabelledImage] = {}
+    omitted, ignored = Counter[str](), Counter[str]()
+    boxes = repeated = absurd = 0
+    farthest, smallest = 0.0, math.inf
+    for image in images:
+        labels = tuple(
+            {
+                (label.track.box, label.track.class_name, label.ignored): label
+                for label in image.labels
+            }.values()
+        )
+        boxes += len(labels)
+        repeated += len(image.labels) - len(labels)
+        absurd += sum(_is_absurd(label.track.box, image.size) for label in labels)
+        farthest = max([farthest, *(max(astuple(label.track.box)) for label in labels)])
+        smallest = min(smallest, *(image.size or (0,)))
+        if image.path in checked:
+            raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
+        checked[image.path] = replace(
+            image,
+            labels=tuple(_image_labels(replace(image, labels=labels), roles, omitted, ignored)),
+            unlabelled=tuple(filter(None, map(roles.class_of, image.unlabelled))),
+        )
+    if not checked:
+        raise TruthError(f"{name}: has no labelled images")
+    if absurd > boxes / 2:
+        raise TruthError(
+            f"{name}: {absurd} of {quantity(boxes, 'box')} are outside their images or within a "
+            "pixel; the numbers must be in the unit of the format"
+        )
+    if 0 < farthest <= _PERCENT < smallest / 2:
+        _log.warning(
+            "%s: no box reaches beyond pixel 100; if these are percent, convert them", name
+        )
+    if repeated:
+        duplicates = quantity(repeated, "label")
+        _log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
+    return LabelledImages(
+        name, tuple(checked.values()), dict(omitted.most_common()), dict(ignored.most_common())
+    )
+
+
+def _is_absurd(box: Box, size: Size | None) -> bool:
+    """Return whether a box cannot be in pixels: it has fractions, or two corners for its size."""
+    width, height = size or (math.inf, math.inf)
+    slack_x, slack_y = _SLACK * width, _SLACK * height
+    reaches_left = box.x1 < -slack_x or box.y1 < -slack_y
+    reaches_right = box.x2 > width + slack_x or box.y2 > height + slack_y
+    return reaches_left or reaches_right or max(box.x2, box.y2) <= 1
+
+
+def _image_labels(
+    image: LabelledImage, roles: Roles, omitted: Counter[str], ignored: Counter[str]
+) -> Iterator[Label]:
+    """Yield the vehicles and ignore regions of an image, and count the other labels."""
+    if not is_file(image.path):
+        raise TruthError(f"{printable(str(image.path))}: not found, but {image.file} labels it")
+    for label in image.labels:
+        name = label.track.class_name or ""
+        role = roles.role_of(name)
+        if role not in ("vehicle", "ignored"):
+            omitted[name] += 1
+            continue
+        if mistake := mistake_in_box(label.track.box):
+            raise line_error(image.file, label.position, mistake)
+        ignored.update([name] if role == "ignored" and not label.ignored else [])
+        is_ignored = label.ignored or role == "ignored"
+        named = label.named(roles.class_of(name) or "vehicle")
+        yield named._replace(ignored=is_ignored)
 
 
 def _images(path: Path) -> Iterable[LabelledImage]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from vdet.boxes import Boxes, Image
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, stage_images_of, warnings_of
+from vdet.detect.detectors import DetectorModel, stage_images_of, warnings_of
 from vdet.errors import ImageError
 from vdet.files import OutputFiles, is_hidden
 from vdet.media import Frame, Picture

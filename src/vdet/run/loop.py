@@ -20,7 +20,7 @@ from pathlib import Path
 from vdet.boxes import NO_BOXES, Image
 from vdet.conditions.cuts import with_cuts
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, VideoDetector
+from vdet.detect.detectors import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.media import Frame, VideoInfo
 from vdet.run.result import Facts, FrameResult

@@ -14,7 +14,7 @@ from statistics import fmean
 from typing import Any
 
 from vdet.boxes import Boxes, iou_matrix
-from vdet.detect.protocol import VideoDetector
+from vdet.detect.detectors import VideoDetector
 from vdet.media import Frame
 from vdet.run.steps import ParallelStep, Step
 from vdet.run.threads import SearchThreads

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
-from vdet.detect.factory import as_model, load_detector
-from vdet.detect.protocol import StageImages, stage_images_of, warnings_of
+from vdet.detect.detectors import StageImages, as_model, load_detector, stage_images_of, warnings_of
 from vdet.errors import ConfigError, FrameSizeError, TruthError, VideoError
 from vdet.files import FileIds, OutputFiles
 from vdet.findings import Finding, Findings, at_places, without

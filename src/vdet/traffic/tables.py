@@ -42,7 +42,7 @@ def read_table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
 
     Raises `TruthError` if it cannot be read, or lacks one of the columns.
     """
-    from vdet.labels.parsing import numbered_lines, read_bytes  # most runs only write tables
+    from vdet.labels.label import numbered_lines, read_bytes  # most runs only write tables
 
     lines = [line for _, line in numbered_lines(path, read_bytes(path))]
     try:

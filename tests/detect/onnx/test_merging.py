@@ -6,16 +6,16 @@ from typing import cast
 import numpy as np
 import pytest
 
-from vdet.boxes import Boxes
+from vdet.boxes import Boxes, Float32Array
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import (
     NetworkDetector,
+    class_numbers,
     combine,
     combined_classes,
-    our_classes,
     suppress,
 )
-from vdet.detect.onnx.recognition import RawBoxes, Recognized
+from vdet.detect.onnx.network import Recognized
 from vdet.media import Picture
 
 
@@ -83,17 +83,15 @@ class FixedSearch:
     class_scores: list[float]
     is_named: bool = True
 
-    def find(self, *_: object) -> RawBoxes:
-        sides = np.array([[40, 20, 60, 40]], np.float32)
-        scores = np.array([self.class_scores], np.float32)
-        classes = scores.argmax(axis=1).astype(np.int32)
-        return RawBoxes(sides, np.array([0.8], np.float32), classes, scores)
+    def find(self, *_: object) -> Float32Array:
+        best = int(np.argmax(self.class_scores))
+        return np.array([[40, 20, 60, 40, 0.8, best, *self.class_scores]], np.float32)
 
 
 def found_in_image(first: list[float], second: list[float], *classes: str) -> dict[str, float]:
     """Return classes and scores of a vehicle; both searches give scores of car and truck for it."""
     settings = NetworkSettings(classes=classes)
-    numbers = np.array([*our_classes(("car", "truck"), combined_classes(settings)), -1], np.int32)
+    numbers = np.array([*class_numbers(("car", "truck"), combined_classes(settings)), -1], np.int32)
     network, larger = (cast("Recognized", FixedSearch(scores)) for scores in (first, second))
     detector = NetworkDetector(network, larger, numbers, settings)
     detections = detector.detect(detector.search(Picture(np.zeros((60, 100, 3), np.uint8)), None))

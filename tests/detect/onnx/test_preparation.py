@@ -8,7 +8,7 @@ import pytest
 
 from codings import in_any_coding
 from vdet.boxes import Float64Array
-from vdet.detect.onnx.recognition import InputForm, Placement
+from vdet.detect.onnx.network import InputForm
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 from vdet.synthetic.render import Renderer
@@ -24,13 +24,13 @@ def road(coding: Coding) -> Picture:
     return Picture(Planes.of_image(ROAD, coding))
 
 
-def seen(form: InputForm, picture: Picture) -> tuple[Float64Array, Placement]:
+def seen(form: InputForm, picture: Picture) -> Float64Array:
     """Return what a network sees: `(3, height, width)`, BGR from 0 to 255."""
-    values, place = form.prepare(picture)
+    values = form.prepare(picture)
     assert values.dtype == form.dtype
     if form.dtype is np.uint8:
-        return values[0].transpose(2, 0, 1).astype(np.float64), place
-    return 255 * values[0, ::-1].astype(np.float64), place
+        return np.asarray(values[0].transpose(2, 0, 1), np.float64)
+    return np.asarray(255 * values[0, ::-1], np.float64)
 
 
 def of_channels(values: Float64Array, measure: Measure = np.mean) -> Float64Array:
@@ -49,9 +49,7 @@ def test_planes_look_like_the_same_picture_as_bgr(
     dtype: Dtype, width: int, height: int, coding: Coding
 ) -> None:
     picture, form = road(coding), InputForm(width, height, dtype)
-    ours, place = seen(form, picture)
-    expected, place_of_bgr = seen(form, Picture(picture.image))
-    assert place == place_of_bgr
+    ours, expected = seen(form, picture), seen(form, Picture(picture.image))
     apart = np.abs(ours - expected)
     assert of_channels(apart).max() < 0.9
     assert np.percentile(apart, 99) <= 3
@@ -73,9 +71,11 @@ def test_planes_are_scaled_before_they_are_converted(
 def test_only_the_letterbox_of_other_networks_is_grey_beyond_the_frame(
     dtype: Dtype, picture: Picture
 ) -> None:
-    values, place = seen(InputForm(96, 96, dtype), picture)
+    form = InputForm(96, 96, dtype)
+    values = seen(form, picture)
     top, height = (0, 96) if dtype is np.uint8 else (21, 54)
-    assert place == Placement(0, top, (96 / 1280, height / 720))
+    frame = np.array([[0, top, 96, top + height]], np.float32)
+    assert form.to_frame(frame, picture) == pytest.approx(np.array([[0, 0, 1280, 720]]))
     is_frame = np.isin(np.arange(96), np.arange(top, top + height))
     assert values[:, ~is_frame] == pytest.approx(114)
     assert (values[:, is_frame].round() != 114).any(axis=(0, 2)).all()
@@ -85,6 +85,6 @@ def test_planes_are_not_changed() -> None:
     picture = road(Coding())
     assert picture.planes is not None
     before = [layer.copy() for layer in picture.planes.layers]
-    InputForm(1280, 720).prepare(picture)[0][:] = 0
+    InputForm(1280, 720).prepare(picture)[:] = 0
     for layer, expected in zip(picture.planes.layers, before, strict=True):
         np.testing.assert_array_equal(layer, expected)

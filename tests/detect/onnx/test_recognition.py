@@ -16,8 +16,7 @@ from detect.onnx.graphs import Form, RedBox, final, ultralytics, write_graph, wr
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import NetworkModel
-from vdet.detect.onnx.recognition import COCO, cell_centers, recognize, vdet_cells
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import COCO, Session, cell_centers, recognize, vdet_cells
 from vdet.errors import ModelError
 from vdet.media import Picture
 from writing import write_image
@@ -245,6 +244,6 @@ def test_the_score_of_a_box_is_calibrated_by_the_class_it_is_named() -> None:
     table[..., 0], table[0, 3, 6] = 0.5, 1.0
     calibration = np.array([[1, 0], [2, -3]], np.float32)
     found = vdet_cells(table, 0.01, cells=cell_centers(32, 32), calibration=calibration)
-    assert found.classes.tolist() == [0, 0, 0, 1, *[0] * 17]
+    assert found[:, 5].tolist() == [0, 0, 0, 1, *[0] * 17]
     expected = [1 / (1 + math.exp(-(1 * 0.5 + 0))), 1 / (1 + math.exp(-(2 * 0.5 - 3)))]
-    assert found.scores[[0, 3]].tolist() == pytest.approx(expected, abs=1e-6)
+    assert found[[0, 3], 4].tolist() == pytest.approx(expected, abs=1e-6)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from detect.onnx.graphs import write_with_weights_elsewhere
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import Session
 from vdet.errors import ModelError
 
 

@@ -7,14 +7,12 @@ import pytest
 
 from vdet.boxes import iou_matrix
 from vdet.config.schema import NetworkSettings
-from vdet.detect.factory import load_detector
+from vdet.detect.detectors import load_detector
 from vdet.detect.onnx.detector import SHIPPED, NetworkDetector
-from vdet.detect.onnx.recognition import recognize
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import Session, recognize
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer
+from vdet.synthetic.render import Renderer, must_be_found, true_boxes
 from vdet.synthetic.scene import demo_scene
-from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.testing import check_detector
 
 MAX_BYTES = 2_500_000
@@ -46,10 +44,9 @@ def test_a_still_picture_is_also_searched_mirrored_with_a_larger_input() -> None
     assert isinstance(detector, NetworkDetector)
     assert (detector.network.form.width, detector.larger.form.width) == (640, 896)
     boxes = [astuple(item.box) for item in true_boxes(scene, FRAME) if must_be_found(item, height)]
-    candidates = detector.search(Picture(Renderer(scene).image(FRAME)), None)
-    assert len(candidates.searches) == 2
-    assert candidates.is_still
-    for found in candidates.searches:
+    searches, is_still = detector.search(Picture(Renderer(scene).image(FRAME)), None)
+    assert (len(searches), is_still) == (2, True)
+    for found in searches:
         overlap = iou_matrix(np.array(boxes), found.sides)
         assert (overlap.max(axis=1) > 0.7).all()
 

@@ -7,12 +7,11 @@ import numpy as np
 
 from vdet.boxes import Image, iou_matrix
 from vdet.config.schema import NetworkSettings
-from vdet.detect.factory import load_detector
+from vdet.detect.detectors import load_detector
 from vdet.detect.onnx.water import WIDTH, is_wet
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer
+from vdet.synthetic.render import Renderer, must_be_found, true_boxes
 from vdet.synthetic.scene import demo_scene
-from vdet.synthetic.truth import must_be_found, true_boxes
 
 FRAME = 40
 

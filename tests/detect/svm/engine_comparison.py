@@ -11,8 +11,7 @@ from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
 from vdet.config.kinds import FeatureSettings, WindowSettings
-from vdet.detect.svm.features import FeatureExtractor, resize
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.model import FeatureExtractor, LinearModel, resize
 from vdet.detect.svm.search import DenseSearch, FramePyramid
 from vdet.detect.svm.windows import WindowGrid, band_grid
 from vdet.media import Picture, Planes

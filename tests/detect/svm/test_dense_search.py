@@ -9,8 +9,7 @@ import pytest
 
 from vdet.boxes import Image
 from vdet.config.kinds import FeatureSettings, HogSettings
-from vdet.detect.svm.features import FeatureExtractor
-from vdet.detect.svm.model import BoxRegression, LinearModel
+from vdet.detect.svm.model import BoxRegression, FeatureExtractor, LinearModel
 from vdet.detect.svm.search import DenseSearch, FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, WindowGrid
 from vdet.media import Picture

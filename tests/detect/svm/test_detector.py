@@ -9,7 +9,7 @@ from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.detector import SearchTrace, SvmModel
+from vdet.detect.svm.detector import Heat, SvmModel
 from vdet.media import Picture
 
 MODEL = red_finder()
@@ -33,9 +33,10 @@ def detect_still(image: Image, settings: SvmSettings = ROWS) -> Boxes:
     return detector.detect(detector.search(Picture(image), None))
 
 
-def trace_of(detections: Boxes) -> SearchTrace:
-    assert isinstance(detections.trace, SearchTrace)
-    return detections.trace
+def heat_of(detections: Boxes) -> Heat:
+    _, heat = detections.trace
+    assert isinstance(heat, Heat)
+    return heat
 
 
 def but(settings: SvmSettings, section: str, **changes: Any) -> SvmSettings:
@@ -49,15 +50,15 @@ def test_a_car_in_consecutive_frames_is_detected_by_a_box_around_it() -> None:
     (box,) = rounded(detections)
     assert box.intersection(CAR) == CAR
     assert box.iou(CAR) > 0.35
-    assert detections.data["strength"].tolist() == pytest.approx([trace_of(detections).heat.peak])
+    assert detections.data["strength"].tolist() == pytest.approx([heat_of(detections).peak])
     assert detections.data["strength"][0] > 1.4
     assert box.contains((detections.data["centroid"][0, 0], detections.data["centroid"][0, 1]))
 
 
 def test_an_empty_road_has_no_heat_and_that_of_a_car_that_has_gone_is_forgotten() -> None:
     *_, detections = detect_video(road(CAR), road(), road())
-    assert trace_of(detections).heat.values.shape == (240, 320)
-    assert trace_of(detections).heat.peak == 0
+    assert heat_of(detections).values.shape == (240, 320)
+    assert heat_of(detections).peak == 0
     assert len(detections) == 0
 
 
@@ -118,7 +119,7 @@ class TestStillPictures:
         settings = but(ROWS, "heat", frames=frames)
         *_, video = detect_video(*[road(CAR)] * frames, settings=settings)
         still = detect_still(road(CAR), settings)
-        np.testing.assert_allclose(trace_of(still).heat.values, trace_of(video).heat.values)
+        np.testing.assert_allclose(heat_of(still).values, heat_of(video).values)
         assert rounded(still) == rounded(video)
 
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])

@@ -4,7 +4,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from seed import SEED
-from vdet.detect.svm.features import FeatureExtractor, cut_window, halve, histogram, resize, split
+from vdet.detect.svm.model import FeatureExtractor, cut_window, halve, histogram, resize, split
 
 PATCH = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 FEATURES = SEED.svm.features

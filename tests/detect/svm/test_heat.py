@@ -6,7 +6,7 @@ import pytest
 
 from vdet.boxes import Box
 from vdet.config.kinds import HeatSettings, WindowSettings
-from vdet.detect.svm.heat import Heat, find_regions, sum_heat
+from vdet.detect.svm.detector import Heat, find_regions, sum_heat
 from vdet.detect.svm.windows import Windows, band_grid
 
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Image
-from vdet.detect.svm.horizon import find_horizon
-from vdet.synthetic.camera import PinholeCamera
+from vdet.detect.svm.windows import find_horizon
 from vdet.synthetic.render import frames
-from vdet.synthetic.scene import demo_scene, empty_road
+from vdet.synthetic.scene import PinholeCamera, demo_scene, empty_road
 
 STEP = 0.01  # between the rows that get votes
 RNG = np.random.default_rng(0)

@@ -8,7 +8,7 @@ from red_cars import red_finder
 from vdet.config.kinds import FeatureSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import SvmSettings
-from vdet.detect.factory import load_detector, model_file
+from vdet.detect.detectors import load_detector, model_file
 from vdet.detect.svm.detector import shipped_model
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import ModelError

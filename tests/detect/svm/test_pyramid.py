@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.config.kinds import FeatureSettings
-from vdet.detect.svm.features import resize, split
+from vdet.detect.svm.model import resize, split
 from vdet.detect.svm.search import FramePyramid
 from vdet.detect.svm.windows import FrameStrip
 from vdet.media import Picture

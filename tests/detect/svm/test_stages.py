@@ -8,8 +8,7 @@ from vdet.boxes import Image
 from vdet.config.kinds import WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.detect.svm.detector import SvmModel, blend_heat
-from vdet.detect.svm.heat import Heat
+from vdet.detect.svm.detector import Heat, SvmModel, blend_heat
 from vdet.media import Picture
 
 NAMES = ["windows", "hits", "heat", "threshold"]

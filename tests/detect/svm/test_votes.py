@@ -7,7 +7,7 @@ import pytest
 
 from boxing import moved_to
 from vdet.boxes import Box, from_xywh
-from vdet.detect.svm.heat import MAX_VOTES, HotRegion, Votes, split_regions
+from vdet.detect.svm.detector import MAX_VOTES, HotRegion, Votes, split_regions
 from vdet.detect.svm.windows import Windows
 
 Vote = tuple[float, float, float, float, float]

@@ -14,7 +14,7 @@ from torch import Tensor  # noqa: E402
 from learn.net.blocks import block_picture, block_source  # noqa: E402
 from vdet.config.schema import NetworkSettings, NetworkTrainingSettings  # noqa: E402
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
-from vdet.detect.onnx.recognition import (  # noqa: E402
+from vdet.detect.onnx.network import (  # noqa: E402
     Header,
     cell_centers,
 )

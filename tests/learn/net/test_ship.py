@@ -12,8 +12,11 @@ torch = pytest.importorskip(
 
 from benchmarks.ship import ship  # noqa: E402
 
-from vdet.detect.onnx.recognition import Header, ScoreCalibration  # noqa: E402
-from vdet.detect.onnx.session import Session  # noqa: E402
+from vdet.detect.onnx.network import (  # noqa: E402
+    Header,
+    ScoreCalibration,
+    Session,
+)
 from vdet.learn.net.export import export_network  # noqa: E402
 from vdet.learn.net.network import Network  # noqa: E402
 

@@ -9,8 +9,7 @@ from labels.writers import Boxed, Labelled, write_coco
 from strange.test_numbered_images import write_pictures
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import VideoError
-from vdet.labels.reading import read_labelled_images
-from vdet.labels.roles import Roles
+from vdet.labels.reading import Roles, read_labelled_images
 from vdet.learn.net.sources import UNLABELLED, clip_source, image_source
 
 

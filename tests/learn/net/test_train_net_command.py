@@ -7,8 +7,7 @@ import pytest
 
 from conftest import Run
 from labels.writers import WRITERS, Boxed, Labelled, write_coco
-from vdet.detect.onnx.recognition import read_header
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import Session, read_header
 
 torch = pytest.importorskip(
     "torch", reason="torch is not installed; `make nettest` installs it and runs these tests"

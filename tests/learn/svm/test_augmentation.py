@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vdet.learn.svm.extraction import PatchSample, augment, cut_off, mirrored
+from vdet.learn.svm.patches import PatchSample, augment, cut_off, mirrored
 
 NOISE = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 
@@ -13,8 +13,8 @@ def patch(*sides: float, vehicle: bool = True) -> PatchSample:
 def augmented(
     monkeypatch: pytest.MonkeyPatch, seed: int, cut: float, part: float
 ) -> list[PatchSample]:
-    monkeypatch.setattr("vdet.learn.svm.extraction.CUT", cut)
-    monkeypatch.setattr("vdet.learn.svm.extraction.PART", part)
+    monkeypatch.setattr("vdet.learn.svm.patches.CUT", cut)
+    monkeypatch.setattr("vdet.learn.svm.patches.PART", part)
     return list(augment(patch(-0.5, -0.5, 0.5, 0.5), np.random.default_rng(seed)))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from vdet.boxes import Image
 from vdet.errors import DataError
-from vdet.learn.svm.dataset import NO_SIDES, Sides, find_patches, patch_archive, read_patches
+from vdet.learn.svm.patches import NO_SIDES, Sides, find_patches, patch_archive, read_patches
 
 PATCH = np.random.default_rng(0).integers(0, 256, (8, 8, 3), dtype=np.uint8)
 PNG = cv2.imencode(".png", PATCH)[1].tobytes()

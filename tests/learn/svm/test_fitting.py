@@ -17,8 +17,7 @@ from vdet.config.kinds import FeatureSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.svm.dataset import PatchFile
-from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
+from vdet.learn.svm.patches import LabelledVectors, PatchFile, RowNumbers
 from vdet.learn.svm.training import fit as fit_rows
 
 FEATURES = FeatureSettings()

@@ -22,8 +22,8 @@ from vdet.learn.svm.mining import (
     compare_windows,
     mine,
 )
+from vdet.synthetic.render import write_truth
 from vdet.synthetic.scene import Scene
-from vdet.synthetic.truth import write_truth
 from vdet.track.track import Track
 
 WIDTH = 1000

@@ -11,11 +11,9 @@ import vdet
 from vdet.boxes import Image
 from vdet.config.kinds import FeatureSettings, HistogramSettings, HogSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
-from vdet.detect.svm.features import FeatureExtractor
-from vdet.detect.svm.model import load_model, save_model
+from vdet.detect.svm.model import FeatureExtractor, load_model, save_model
 from vdet.errors import DataError
-from vdet.learn.svm.dataset import PatchFile, find_patches
-from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
+from vdet.learn.svm.patches import LabelledVectors, PatchFile, extract, find_patches, hold_out
 from vdet.learn.svm.training import train
 from vdet.media.images import read_image
 from writing import write_image

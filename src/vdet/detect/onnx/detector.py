@@ -23,8 +23,7 @@ from vdet.boxes import (
 )
 from vdet.config.classes import standard_class
 from vdet.config.schema import NetworkSettings
-from vdet.detect.onnx.recognition import COCO, Recognized, recognize
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import COCO, Recognized, Session, recognize
 from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError, printable
 from vdet.media import Picture
@@ -42,12 +41,8 @@ _BOTH = 1.65
 """Odds of a box that both searches found, as a multiple of the mean odds of the two."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidates:
-    """The boxes of each search before suppression, and whether it was of a single image."""
-
-    searches: Sequence[Boxes]
-    is_still: bool
+Candidates = tuple[Sequence[Boxes], bool]
+"""The boxes of each search before suppression, and whether it was of a single image."""
 
 
 _FOUR_WHEELED = "car", "truck", "bus", "vehicle"
@@ -73,7 +68,7 @@ class NetworkModel:
         self._settings = settings
         self._recognized = recognize(Session(path), settings.class_names or ())
         names = self._recognized.names
-        self._numbers = np.array([*our_classes(names, combined_classes(settings)), -1], np.int32)
+        self._numbers = np.array([*class_numbers(names, combined_classes(settings)), -1], np.int32)
         detectable = [
             name for number, name in enumerate(settings.classes) if number in self._numbers
         ]
@@ -131,41 +126,40 @@ class NetworkDetector:
         """
         settings, is_still = self.settings, index is None
         if not is_still or self.larger is self.network:
-            return Candidates([self._find(self.network, picture, settings.classes)], is_still)
+            return [self._find(self.network, picture, settings.classes)], is_still
         names = combined_classes(settings)
         image = Picture(np.ascontiguousarray(picture.image[:, ::-1]))
-        searches = self._find(self.network, picture, names), self._find(self.larger, image, names)
-        return Candidates([searches[0], _mirrored(searches[1], picture.width)], is_still)
+        mirrored = _mirrored(self._find(self.larger, image, names), picture.width)
+        return [self._find(self.network, picture, names), mirrored], is_still
 
     def _find(self, network: Recognized, picture: Picture, names: Sequence[str]) -> Boxes:
         """Return the boxes of the named classes, the first of `combined_classes`, unsuppressed."""
-        raw = network.find(picture, self.settings.min_score)
+        size = picture.width, picture.height
+        found = network.find(picture, self.settings.min_score)
+        classes = found[:, 5].astype(np.int64)
         if not network.is_named:
-            self.seen.update(raw.classes.tolist())
-        sides = clipped(raw.sides.astype(np.float64), (picture.width, picture.height))
-        numbers = self.numbers[raw.classes.clip(-1, len(self.numbers) - 1)]
+            self.seen.update(classes.tolist())
+        sides = clipped(found[:, :4].astype(np.float64), size)
+        numbers = self.numbers[classes.clip(-1, len(self.numbers) - 1)]
         rows = (numbers >= 0) & (numbers < len(names))
-        rows &= (sides[:, 2:] - sides[:, :2] >= 1).all(axis=1)  # not with a NaN
-        rows &= ~(
-            _have_four_wheels(numbers, names)
-            & _are_too_high(sides, (picture.width, picture.height))
-        )
+        rows &= (sides[:, 2:] - sides[:, :2] >= 1).all(axis=1)
+        rows &= ~(_have_four_wheels(numbers, names) & _are_too_high(sides, size))
         data = {}
-        if raw.class_scores is not None:
+        if found.shape[1] > 6:
             means_name = self.numbers[:-1, np.newaxis] == np.arange(len(names))
-            data["class_scores"] = raw.class_scores[rows] @ means_name
-        return Boxes(sides[rows], raw.scores[rows], classes=numbers[rows], names=names, data=data)
+            data["class_scores"] = found[rows, 6:] @ means_name
+        return Boxes(sides[rows], found[rows, 4], classes=numbers[rows], names=names, data=data)
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
         settings, names = self.settings, self.settings.classes
-        overlap = settings.nms_iou
-        boxes, *second = (suppress(boxes, overlap) for boxes in candidates.searches)
-        if second:
-            boxes = combine(boxes, second[0], overlap)
+        searches, is_still = candidates
+        boxes, *mirrored = (suppress(boxes, settings.nms_iou) for boxes in searches)
+        if mirrored:
+            boxes = combine(boxes, mirrored[0], settings.nms_iou)
         assert boxes.classes is not None
         rows = (boxes.scores >= settings.min_score) & (boxes.classes < len(names))
-        if candidates.is_still:
+        if is_still:
             rows &= boxes.reach(settings.min_score_still, settings.class_minima)
             large = np.flatnonzero(rows & _have_four_wheels(boxes.classes, names))
             nested = are_nested(boxes.sides[large], boxes.scores[large])
@@ -176,7 +170,7 @@ class NetworkDetector:
             classes=boxes.classes[rows],
             names=names,
             data={name: column[rows, : len(names)] for name, column in boxes.data.items()},
-            trace=candidates.searches,
+            trace=searches,
         )
 
     def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
@@ -185,8 +179,7 @@ class NetworkDetector:
         for boxes in detections.trace:
             for candidate in boxes:
                 draw_box(candidates, candidate.box, GREEN, f"{candidate.score:.2f}")
-        scaled, _ = self.network.form.scaled(Picture(image))
-        return {"input": scaled, "candidates": candidates}
+        return {"input": self.network.form.scaled(Picture(image)), "candidates": candidates}
 
 
 def _have_four_wheels(classes: Int32Array, names: Sequence[str]) -> BoolArray:
@@ -274,7 +267,7 @@ def combined_classes(settings: NetworkSettings) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*settings.classes, *_USUAL)))
 
 
-def our_classes(names: Sequence[str], chosen: Sequence[str]) -> list[int]:
+def class_numbers(names: Sequence[str], chosen: Sequence[str]) -> list[int]:
     """Return the index in `chosen` of each class of a network, -1 if it is missing."""
     numbers = {name: number for number, name in enumerate(chosen)}
     return [numbers.get(standard_class(name) or name.strip().lower(), -1) for name in names]

@@ -8,15 +8,12 @@ searched as four such grids. Windows of other grids share only the gradients of 
 (`table_sums`).
 """
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array, Image
 from vdet.config.kinds import FeatureSettings
-from vdet.detect.svm.features import Channels, halve, hog_descriptors, resize, split
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.model import Channels, LinearModel, halve, hog_descriptors, resize, split
 from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, IndexArray, WindowGrid
 from vdet.media import Picture
 
@@ -135,18 +132,10 @@ BATCH = 8192
 """Maximum number of windows whose vectors are in memory at once."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _StripWindows:
-    """`n` windows of a grid that lie at whole pixels of one strip.
-
-    `numbers` `(n,)` are those in the grid; `x` and `y`, `(n,)` each, are the top-left pixels of the
-    windows in the strip.
-    """
-
-    numbers: IndexArray
-    strip: FrameStrip
-    x: IndexArray
-    y: IndexArray
+_Part = tuple[IndexArray, FrameStrip, IndexArray, IndexArray]
+"""`n` windows of a grid that lie at whole pixels of one strip: their numbers in the grid, the
+strip, and the top-left pixels in it, x and y.
+"""
 
 
 class DenseSearch:
@@ -182,25 +171,25 @@ class DenseSearch:
         model, features = self._model, self._model.features
         probabilities = np.zeros(self._count, np.float32)
         sides = np.tile(WINDOW_SIDES, (self._count, 1))
-        for part in self._parts:
-            strip, x, y = frame.cut(part.strip), part.x, part.y
+        for numbers, area, x, y in self._parts:
+            strip = frame.cut(area)
             hog = self._hog(strip, features)
             values = table_sums(strip, self._tables, features, x, y)
             values += hog.values(self._weights, x, y)
-            probabilities[part.numbers] = model.to_probabilities(values + model.biases)
-            hits = probabilities[part.numbers] >= probability
+            probabilities[numbers] = model.to_probabilities(values + model.biases)
+            hits = probabilities[numbers] >= probability
             if model.box_regression is not None and hits.any():
                 vectors = hog.vectors(x[hits], y[hits])
-                sides[part.numbers[hits]] = model.box_regression.sides(vectors)
+                sides[numbers[hits]] = model.box_regression.sides(vectors)
         return probabilities, sides
 
 
-def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _StripWindows:
+def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
     """Return every n-th window, from this column and row on."""
     numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)[row::n, column::n]
     pixels = int(n * grid.step * patch / grid.size)
     y, x = np.indices(numbers.shape).reshape(2, -1) * pixels
-    return _StripWindows(numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y)
+    return numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y
 
 
 class Blocks:

@@ -1,20 +1,24 @@
-"""Windows: their positions in a frame, and their probabilities.
+"""Windows: their positions in a frame, by the horizon of the camera, and their probabilities.
 
 Sets over fixed rows follow the overlap rule of the original system, which places 423 + 408 = 831
 windows on a frame of 1280×720. Other sets follow the perspective: on a flat road, a vehicle of
 width w stands on the row horizon + w · (height of the camera) / (real width of the vehicle). The
 farther away, the smaller it is, and the nearer to the horizon. So the horizon determines the rows
-of all sizes.
+of all sizes. Lane lines, barriers, kerbs and roofs run along the road, so in the image they meet in
+its vanishing point, and line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector",
+2012).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array, Int32Array
+from vdet.boxes import Float32Array, Float64Array, Image, Int32Array
 from vdet.config.kinds import FeatureSettings, PerspectiveSettings, WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
@@ -213,3 +217,71 @@ def perspective_grids(
             left = -beyond * step
             grids.append(WindowGrid(size, step, left, Fraction(top), int(columns), int(rows)))
     return grids
+
+
+DEFAULT_HORIZON = 0.58
+"""Usual horizon of dashboard cameras, fraction of the height; used if none is found."""
+
+_WIDTH = 640  # pixels of the image in which segments are detected
+_MIN_LENGTH = 0.02  # of a segment, fraction of the width
+_SLOPES = (12.0, 75.0)  # degrees from the horizontal; vehicles are flatter, poles are steeper
+_MAX_SINE = 0.05  # of the angle between a segment and the direction to its vanishing point
+_MIN_SEGMENTS = 8  # on each side
+_ROWS = np.arange(0.30, 0.75, 0.01)
+_COLUMNS = np.arange(0.25, 0.76, 0.02)
+
+
+def find_horizon(images: Sequence[Image]) -> float | None:
+    """Return the row of the horizon, fraction of the frame's height.
+
+    Parameters
+    ----------
+    images
+        Frames of one camera, BGR uint8 `(H, W, 3)`, all of one size.
+
+    Returns
+    -------
+    0.30 to 0.74 in steps of 0.01; None if too few lines run along the road.
+    """
+    height, width = images[0].shape[:2]
+    ends = np.concatenate([_segment_ends(image) for image in images])
+    directions = ends[:, 2:] - ends[:, :2]
+    falling = directions[:, 0] * directions[:, 1] > 0
+    sides = ends[falling], ends[~falling]
+    if min(map(len, sides)) < _MIN_SEGMENTS:
+        return None
+    left, right = (_sum_votes(side, height / width) for side in sides)
+    both = np.minimum(left, right)  # a vanishing point has lines on both sides
+    votes = both + 0.2 * (left + right)
+    row, _ = np.unravel_index(int(votes.argmax()), votes.shape)
+    return round(float(_ROWS[row]), 2) if both.any() else None
+
+
+def _segment_ends(image: Image) -> Float64Array:
+    """Return x, y of both ends of the usable segments, `(n, 4)`, in widths of the frame."""
+    height, width = image.shape[:2]
+    small = (_WIDTH, max(1, round(height * _WIDTH / width)))
+    grey = cv2.cvtColor(cv2.resize(image, small, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
+    lines = cv2.createLineSegmentDetector().detect(grey)[0]
+    ends = np.zeros((0, 4)) if lines is None else np.asarray(lines, np.float64).reshape(-1, 4)
+    ends = ends / _WIDTH
+    across, down = abs(ends[:, 2] - ends[:, 0]), abs(ends[:, 3] - ends[:, 1])
+    slopes = np.degrees(np.arctan2(down, across))
+    usable = (np.hypot(across, down) > _MIN_LENGTH) & (slopes > _SLOPES[0]) & (slopes < _SLOPES[1])
+    return np.asarray(ends[usable])
+
+
+def _sum_votes(ends: Float64Array, aspect: float) -> Float64Array:
+    """Sum the votes of segments, `(n, 4)`, for each point, `(rows, columns)`.
+
+    A segment votes for points above its centre, weighted by its length.
+    """
+    directions = ends[:, 2:] - ends[:, :2]
+    lengths = np.hypot(directions[:, 0], directions[:, 1])
+    normals = np.stack([-directions[:, 1], directions[:, 0]], axis=1) / lengths[:, np.newaxis]
+    middles = (ends[:, :2] + ends[:, 2:]) / 2
+    x, y = np.meshgrid(_COLUMNS, _ROWS * aspect)
+    dx, dy = x[..., np.newaxis] - middles[:, 0], y[..., np.newaxis] - middles[:, 1]
+    sines = abs(dx * normals[:, 0] + dy * normals[:, 1]) / (np.hypot(dx, dy) + 1e-9)
+    votes = lengths * np.maximum(0, 1 - (sines / _MAX_SINE) ** 2) * (dy < 0)
+    return np.asarray(votes.sum(axis=-1))

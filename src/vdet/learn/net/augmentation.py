@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Float64Array, Image, area, coverage, iou_matrix
 from vdet.config.schema import NetworkTrainingSettings
-from vdet.detect.onnx.recognition import GREY
+from vdet.detect.onnx.network import GREY
 from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import blended, draw_sign, with_weather
 

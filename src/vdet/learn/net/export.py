@@ -18,8 +18,7 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
-from vdet.detect.onnx.recognition import HEADER_KEY, Header, read_header
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import HEADER_KEY, Header, Session, read_header
 from vdet.errors import DataError
 from vdet.files import staged
 from vdet.learn.net.network import Network

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from vdet.detect.onnx.recognition import STRIDES, cell_centers
+from vdet.detect.onnx.network import STRIDES, cell_centers
 from vdet.learn.net.sources import UNLABELLED, NetSource
 
 STEM = 16

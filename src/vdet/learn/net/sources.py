@@ -14,8 +14,7 @@ from vdet.config.schema import Settings
 from vdet.errors import printable, quantity
 from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import Label
-from vdet.labels.reading import read_truth
-from vdet.labels.roles import Roles
+from vdet.labels.reading import Roles, read_truth
 from vdet.media.reader import VideoReader
 
 MAX_PIXELS = 640_000

@@ -12,8 +12,7 @@ import torch
 
 from vdet.boxes import BoolArray
 from vdet.config.schema import NetworkTrainingSettings
-from vdet.detect.onnx.recognition import Header, read_header
-from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.network import Header, Session, read_header
 from vdet.errors import DataError
 from vdet.files import staged
 from vdet.learn.net.augmentation import ImageDrawing, SampleDrawer

@@ -22,13 +22,12 @@ import numpy as np
 from vdet.boxes import BoolArray, Box, Float64Array, coverage, cut_sides, from_xywh
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.features import cut_window, resize
+from vdet.detect.svm.model import cut_window, resize
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, TruthError, VideoError
 from vdet.labels.label import Label, boxes_of
-from vdet.labels.reading import read_truth
-from vdet.labels.roles import Roles
-from vdet.learn.svm.dataset import Sides, patch_archive
+from vdet.labels.reading import Roles, read_truth
+from vdet.learn.svm.patches import Sides, patch_archive
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress

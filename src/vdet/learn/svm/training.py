@@ -27,8 +27,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.errors import DataError
 from vdet.evaluate.output import figure, table
-from vdet.learn.svm.dataset import PatchFile
-from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
+from vdet.learn.svm.patches import LabelledVectors, PatchFile, extract, hold_out
 from vdet.progress import Progress, no_progress
 from vdet.version import __version__
 

@@ -16,13 +16,13 @@ from vdet.files import json_text, print_now, valid_text, write_text
 from vdet.findings import AT_LINES, without
 from vdet.labels.coco import COCO, write_coco_images
 from vdet.labels.formats import (
-    ImageTracks,
     TrackWriter,
     check_track_name,
     format_for,
     track_suffixes,
 )
-from vdet.labels.label import SourceVideo
+from vdet.labels.images import LabelledImage
+from vdet.labels.label import Label, SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.result import FrameResult, findings_in
@@ -116,7 +116,7 @@ class LabelSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        self._images: list[ImageTracks] = []
+        self._images: list[LabelledImage] = []
 
     def finish(self) -> None:
         """Write the file."""
@@ -127,7 +127,8 @@ class LabelSink(BaseSink):
         """Add an image."""
         name = self.context.places.get(result.source, Path(result.source.name))
         size = result.frame.picture.width, result.frame.picture.height
-        self._images.append(ImageTracks(name, size, result.tracks))
+        labels = tuple(map(Label, result.tracks))
+        self._images.append(LabelledImage(name, self.path, labels, size))
 
 
 LABELS = SinkKind(LabelSink, (COCO.suffix,), "labels of images", takes="images")

@@ -15,10 +15,9 @@ from vdet.draw.boxes import WHITE, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
-from vdet.media.cutting import copied_suffix, copy_part, encode_part
 from vdet.media.demux import is_pipe
 from vdet.media.images import encode_image, is_image_name
-from vdet.media.writer import is_marked
+from vdet.media.writer import copied_suffix, copy_part, encode_part, is_marked
 from vdet.pages.batch import write_index, write_reviews
 from vdet.pages.render import PAGE_NAME, REVIEW_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage

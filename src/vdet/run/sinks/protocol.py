@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
-from vdet.detect.protocol import StageImages
+from vdet.detect.detectors import StageImages
 from vdet.errors import OutputError
 from vdet.files import OutputFiles, output_errors
 from vdet.media import VideoInfo

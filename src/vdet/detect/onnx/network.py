@@ -1,9 +1,10 @@
-"""The form of a network, recognized by its metadata and output: its input, and its boxes."""
+"""A network in an ONNX file: it runs, its form is recognized, and its output becomes boxes."""
 
 import ast
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -13,12 +14,81 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, ValidationError
 
-from vdet.boxes import Float32Array, Image, Int32Array
+from vdet.boxes import Float32Array, Image
 from vdet.config.section import Section
-from vdet.detect.onnx.session import Array, Session
 from vdet.detect.onnx.water import without_drops
 from vdet.errors import ModelError
+from vdet.files import read_whole
 from vdet.media import Picture
+
+Array = npt.NDArray[Any]
+
+MAX_BYTES = 500_000_000
+"""Maximum size of an ONNX file."""
+_SILENT = 4  # log level of onnxruntime, because every error is also raised
+
+
+class Session:
+    """A network ready to run; threads may share it.
+
+    Attributes
+    ----------
+    inputs
+        Each has a `name`, a `shape` and a `type`, such as `tensor(float)`.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is not an ONNX file that onnxruntime can run, or has its weights in
+        other files.
+    """
+
+    def __init__(self, path: Path) -> None:
+        data = read_whole(path, limit=MAX_BYTES, what="model", error=ModelError)
+        # Keeps onnxruntime from reporting to its maker and from writing into the home folder.
+        os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+        import onnxruntime
+
+        self.path = path
+        options = onnxruntime.SessionOptions()
+        # One thread, because frames run in parallel.
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.enable_mem_pattern = False  # it would reserve more than is used
+        options.log_severity_level = _SILENT
+        # External weights would be read from this folder, which cannot exist.
+        folder = "session.model_external_initializers_file_folder_path"
+        options.add_session_config_entry(folder, os.devnull)
+        try:
+            self._session = onnxruntime.InferenceSession(
+                data, options, providers=["CPUExecutionProvider"]
+            )
+            self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
+            self.inputs = self._session.get_inputs()
+        except Exception as error:  # onnxruntime raises its own kinds, and built-in ones
+            raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
+
+    def run(self, values: Array) -> list[Array]:
+        """Return all outputs for the values of the single input.
+
+        Raises
+        ------
+        ModelError
+            It fails.
+        """
+        try:
+            outputs: list[Array] = self._session.run(None, {self.inputs[0].name: values})
+        except Exception as error:  # onnxruntime raises its own kinds
+            message = f"{self.path}: fails on an image: {_in_words(error)}"
+            raise ModelError(message) from error
+        return outputs
+
+
+def _in_words(error: Exception) -> str:
+    message = str(error)
+    if "External data" in message:
+        return "its weights are in other files; export it as one file"
+    return message.partition("\n")[0][:200]
+
 
 _MAX_FINAL_ROWS = 1000
 _NORMALISED = 2.0  # pixels of the input: boxes that all end nearer to the corner are fractions
@@ -63,37 +133,17 @@ Cells = tuple[Float32Array, Float32Array]
 """Centres `(cells, 2)`, x and y in pixels of the input, and strides `(cells,)` of all cells."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RawBoxes:
-    """Boxes as the network gives them, before any check; only decoding uses them.
+OutputLayout = Callable[[Array, float], Float32Array]
+"""Converts an output to rows of a box, float32 `(n, 6)` or `(n, 6 + classes)`: x1, y1, x2, y2 in
+pixels of the input, score, class, and the probability of each class if the network outputs it.
 
-    `sides` float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input or of the frame; `scores` float32
-    `(n,)`, 0 to 1; `classes` int32 `(n,)`: indices in the names of the network; `class_scores`
-    float32 `(n, len(names))`: probability of each class, None if the network outputs only the best
-    class.
-    """
-
-    sides: Float32Array
-    scores: Float32Array
-    classes: Int32Array
-    class_scores: Float32Array | None = None
-
-
-def joined(parts: Sequence[RawBoxes]) -> RawBoxes:
-    """Return the boxes of several searches of one picture."""
-    if len(parts) == 1:
-        return parts[0]
-    columns = ([getattr(part, name) for part in parts] for name in RawBoxes.__slots__)
-    return RawBoxes(*map(np.concatenate, columns))
-
-
-OutputLayout = Callable[[Array, float], RawBoxes]
-"""Converts an output to boxes in pixels of the input; drops scores below a minimum, not a NaN."""
+Scores below a minimum are dropped, not a NaN; nothing else is checked.
+"""
 
 
 def vdet_cells(
     output: Array, minimum: float, *, cells: Cells, calibration: Float32Array
-) -> RawBoxes:
+) -> Float32Array:
     """Read our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.network`.
 
     `cells` are those of the input, from `cell_centers`; `calibration` `(classes, 2)` has slope and
@@ -110,10 +160,10 @@ def vdet_cells(
     middle = centers[rows]
     sides = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
     class_scores = np.exp(table[rows, 5:] - table[rows, 5:].max(axis=1, keepdims=True))
-    return _raw(sides, 1 / (1 + np.exp(-logits[rows])), best[rows], class_scores)
+    return _rows(sides, 1 / (1 + np.exp(-logits[rows])), best[rows], class_scores)
 
 
-def center_columns(output: Array, minimum: float) -> RawBoxes:
+def center_columns(output: Array, minimum: float) -> Float32Array:
     """Read Ultralytics v8 and later: `(1, 4 + classes, n)`, columns of middle, size and scores."""
     table = output[0].T
     scores = table[:, 4:]
@@ -121,14 +171,14 @@ def center_columns(output: Array, minimum: float) -> RawBoxes:
     rows = np.flatnonzero(~(best < minimum))
     middle, half = table[rows, :2], table[rows, 2:4] / 2
     sides = np.concatenate([middle - half, middle + half], axis=1)
-    return _raw(sides, best[rows], classes[rows], scores[rows])
+    return _rows(sides, best[rows], classes[rows], scores[rows])
 
 
-def final_rows(output: Array, minimum: float) -> RawBoxes:
+def final_rows(output: Array, minimum: float) -> Float32Array:
     """Read `(1, n, 6)` after suppression: x1, y1, x2, y2, score, class; empty rows have score 0."""
     table = output[0]
     table = table[~(table[:, 4] < minimum)]
-    return _raw(table[:, :4], table[:, 4], table[:, 5])
+    return _rows(table[:, :4], table[:, 4], np.nan_to_num(table[:, 5], nan=-1))
 
 
 def cell_centers(width: int, height: int) -> Cells:
@@ -141,15 +191,15 @@ def cell_centers(width: int, height: int) -> Cells:
     return np.concatenate(centers).astype(np.float32), np.concatenate(strides).astype(np.float32)
 
 
-def _raw(
+def _rows(
     sides: Array, scores: Array, classes: Array, class_scores: Array | None = None
-) -> RawBoxes:
-    """Return the boxes; each row of `class_scores`, at least 0, is normalized to a sum of 1."""
+) -> Float32Array:
+    """Join the columns; each row of `class_scores`, at least 0, is normalized to a sum of 1."""
+    columns = [sides, scores[:, np.newaxis].clip(0, 1), classes[:, np.newaxis]]
     if class_scores is not None:
-        class_scores = np.nan_to_num(class_scores.astype(np.float32).clip(1e-9, 1))
-        class_scores /= class_scores.sum(axis=1, keepdims=True)
-    scores = scores.astype(np.float32).clip(0, 1)
-    return RawBoxes(sides.astype(np.float32), scores, classes.astype(np.int32), class_scores)
+        shares = np.nan_to_num(class_scores.astype(np.float32).clip(1e-9, 1))
+        columns.append(shares / shares.sum(axis=1, keepdims=True))
+    return np.concatenate(columns, axis=1, dtype=np.float32)
 
 
 _MULTIPLE = 32  # of pixels: the stride of the coarsest cells
@@ -175,53 +225,43 @@ class InputForm:
     height: int
     dtype: type[np.generic] = np.uint8
 
-    def prepare(self, picture: Picture) -> tuple[npt.NDArray[Any], "Placement"]:
-        """Return the input for a frame, and the placement of the frame in it."""
-        image, placement = self.scaled(picture)
+    def prepare(self, picture: Picture) -> Array:
+        """Return the input for a frame."""
+        image = self.scaled(picture)
         if self.dtype is np.uint8:
-            return image[np.newaxis], placement
-        return cv2.dnn.blobFromImage(image, 1 / 255, swapRB=True), placement
+            return image[np.newaxis]
+        return cv2.dnn.blobFromImage(image, 1 / 255, swapRB=True)
 
-    def scaled(self, picture: Picture) -> tuple[Image, "Placement"]:
-        """Return the input as an image, BGR uint8, and the placement of the frame in it."""
+    def scaled(self, picture: Picture) -> Image:
+        """Return the input as an image, BGR uint8; planes are scaled before conversion."""
+        x, y, width, height = self._placed(picture)
+        scaled = picture.to_bgr([_scaled(layer, width, height) for layer in picture.layers])
+        if scaled.shape[:2] == (self.height, self.width):
+            return scaled
+        canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
+        canvas[y : y + height, x : x + width] = scaled
+        return canvas
+
+    def to_frame(self, sides: Float32Array, picture: Picture) -> Float32Array:
+        """Convert boxes in the input, `(n, 4)` x1, y1, x2, y2, to pixels of the frame."""
+        x, y, width, height = self._placed(picture)
+        scales = np.array([width / picture.width, height / picture.height] * 2, np.float32)
+        return np.asarray((sides - np.array([x, y] * 2, np.float32)) / scales)
+
+    def _placed(self, picture: Picture) -> tuple[int, int, int, int]:
+        """Return where the frame lies in the input: x, y, width, height."""
         width, height = self.width, self.height
         if self.dtype is not np.uint8:
             factor = min(width / picture.width, height / picture.height)
             width = max(1, round(picture.width * factor))
             height = max(1, round(picture.height * factor))
-        left, top = (self.width - width) // 2, (self.height - height) // 2
-        placement = Placement(left, top, (width / picture.width, height / picture.height))
-        scaled = _scaled_picture(picture, width, height)
-        if scaled.shape[:2] == (self.height, self.width):
-            return scaled, placement
-        canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
-        canvas[top : top + height, left : left + width] = scaled
-        return canvas, placement
-
-
-@dataclass(frozen=True, slots=True)
-class Placement:
-    """Placement of a frame in the input: its top-left pixel, and its scales in x and y."""
-
-    left: int
-    top: int
-    scales: tuple[float, float]
-
-    def to_frame(self, sides: Float32Array) -> Float32Array:
-        """Convert boxes in the input, `(n, 4)` x1, y1, x2, y2, to pixels of the frame."""
-        offset = np.array([self.left, self.top] * 2, np.float32)
-        return np.asarray((sides - offset) / np.array(self.scales * 2, np.float32))
+        return (self.width - width) // 2, (self.height - height) // 2, width, height
 
 
 def size_of_area(width: int, height: int, pixels: float) -> tuple[int, int]:
     """Return an input size of about `pixels`, in the aspect ratio of a frame, for our networks."""
     factor = (pixels / (width * height)) ** 0.5 / _MULTIPLE
     return max(1, round(width * factor)) * _MULTIPLE, max(1, round(height * factor)) * _MULTIPLE
-
-
-def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
-    """Return a picture as BGR in another size; planes are scaled before conversion."""
-    return picture.to_bgr([_scaled(layer, width, height) for layer in picture.layers])
 
 
 def _scaled(image: Image, width: int, height: int) -> Image:
@@ -277,8 +317,8 @@ class Recognized:
         size = size_of_area(width, height, self.header.pixels * scale)
         return _of_vdet(self.session, self.header, size)
 
-    def find(self, picture: Picture, minimum: float) -> RawBoxes:
-        """Return the boxes in pixels of the picture, with scores of at least `minimum`.
+    def find(self, picture: Picture, minimum: float) -> Float32Array:
+        """Return the rows of `OutputLayout`, in pixels of the picture, from score `minimum`.
 
         Our networks also search what lies behind water on the windscreen. Several threads may call
         this at once.
@@ -288,20 +328,21 @@ class Recognized:
         ModelError
             The network does not run, or its output is not what its form says.
         """
-        values, placement = self.form.prepare(picture)
+        values = self.form.prepare(picture)
         dry = without_drops(values[0]) if self.header else None
         inputs = [values] if dry is None else [values, dry[np.newaxis]]
         outputs = [self.session.run(item)[0] for item in inputs]
         try:
             with np.errstate(all="ignore"):  # numbers of any size
-                raw = joined([self.layout(output, minimum) for output in outputs])
-                boxes = replace(raw, sides=placement.to_frame(raw.sides))
+                boxes = np.concatenate([self.layout(output, minimum) for output in outputs])
+                farthest = boxes[:, :4].max(initial=-math.inf)
+                boxes[:, :4] = self.form.to_frame(boxes[:, :4], picture)
         except (ValueError, TypeError, IndexError) as error:
             raise _unknown(self.session, f"its output is {_shapes(outputs)}") from error
-        if not (np.isfinite(raw.scores).all() and np.isfinite(raw.sides).all()):
+        if not np.isfinite(boxes[:, :5]).all():
             seen = "its output has numbers that are not finite"
             raise ModelError(f"{self.session.path}: {seen}; export it in float32")
-        if raw.sides.max(initial=-math.inf) < _NORMALISED and len(raw.sides):
+        if len(boxes) and farthest < _NORMALISED:
             raise _unknown(self.session, "its boxes are fractions of the input, not pixels")
         return boxes
 
