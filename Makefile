@@ -18,7 +18,7 @@ UNSEEN ?= build/unseen_$(FOLDS)x$(STEPS)
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint types tests nettest dist bench net unseen ship soak folds data model picture \
+.PHONY: help demo test lint types tests nettest dist bench net unseen ship soak data model picture \
 	commands clean
 
 help:  ## print this list
@@ -57,10 +57,6 @@ bench: $(TOOLS)  ## measure speed and memory, as ratios of one run
 soak: $(TOOLS)  ## check that nothing grows in a run of 20,000 frames (minutes, 1 GB in TMPDIR)
 	$(BIN)/python -m benchmarks.soak
 	$(BIN)/python -m benchmarks.soak --fixed
-
-folds: $(TOOLS)  ## check every threshold on frames that the model has not seen (after make model)
-	$(BIN)/python -m benchmarks.folds $(DATA)/project_video.mp4 $(TRUTH) \
-		$(PATCHES) build/model/mined.zip
 
 data:  ## download the patch set (125 MB) into data/; data/README.md says what it is
 	cd data && for name in vehicles non-vehicles; do \

@@ -13,9 +13,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks.hour import seconds_of_count
-from benchmarks.material import find_video, read_pictures, shipped_config
-from benchmarks.runs import IMPORTS, peak_memory, run_times, seconds_of_video, start_times
+from benchmarks.material import find_video, read_pictures, shipped_svm
+from benchmarks.runs import (
+    IMPORTS,
+    peak_memory,
+    run_times,
+    seconds_of_count,
+    seconds_of_video,
+    start_times,
+)
 from benchmarks.searches import search_times, times_by_height
 from vdet.workers import limit_library_threads
 
@@ -48,7 +54,7 @@ def main() -> None:
 
 def measure_all(folder: Path, rounds: int) -> list[Measurement]:
     path = find_video(folder)
-    svm, seed = shipped_config("svm"), shipped_config("seed")
+    svm, seed = shipped_svm("svm"), shipped_svm("seed")
     pictures = read_pictures(path)
     print(f"measuring on {path.name} …", file=sys.stderr)
     limit_library_threads()

@@ -1,13 +1,14 @@
-"""What is measured: shipped settings with their models, and frames of the project video."""
+"""What is measured: shipped models, the project video, and what runs are compared with."""
 
+import itertools
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
+import av
+from av.video.frame import PictureType
+
 from vdet.config.loading import find_config, load_settings
-from vdet.config.schema import Settings
-from vdet.detect.svm.detector import SvmModel, shipped_model
-from vdet.detect.svm.model import LinearModel, load_model
+from vdet.detect.svm.detector import SvmModel, load_svm
 from vdet.media import Picture
 from vdet.media.reader import VideoReader
 from vdet.synthetic.render import write_clip
@@ -16,21 +17,9 @@ from vdet.synthetic.scene import demo_scene
 FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
 
 
-@dataclass(frozen=True)
-class ShippedConfig:
-    """Shipped settings with the shipped model for them."""
-
-    settings: Settings
-    model: LinearModel
-
-    @property
-    def detector(self) -> SvmModel:
-        return SvmModel(self.model, self.settings.svm)
-
-
-def shipped_config(name: str) -> ShippedConfig:
-    settings = load_settings([find_config(name)])
-    return ShippedConfig(settings, load_model(shipped_model(settings.svm)))
+def shipped_svm(name: str) -> SvmModel:
+    """Return the shipped linear model for shipped settings."""
+    return load_svm(load_settings([find_config(name)]).svm, None)
 
 
 def find_video(folder: Path) -> Path:
@@ -50,3 +39,20 @@ def read_pictures(path: Path) -> list[Picture]:
     with VideoReader(path, frames=max(FRAMES_SEARCHED) + 1) as reader:
         read = [frame.picture for frame in reader if frame.index % 10 == 0]
     return [read[index // 10 % len(read)] for index in FRAMES_SEARCHED]
+
+
+OPTIONS = {"preset": "superfast", "crf": "25"}
+"""Those of the default settings."""
+
+
+def transcode(path: Path, out: Path, frames: int) -> None:
+    """Decode and encode the first frames, and nothing else."""
+    with av.open(str(path)) as source, av.open(str(out), "w") as target:
+        stream = source.streams.video[0]
+        stream.thread_type = "AUTO"
+        encoder = target.add_stream("libx264", rate=stream.average_rate, options=OPTIONS)
+        encoder.width, encoder.height = stream.width, stream.height
+        for frame in itertools.islice(source.decode(stream), frames):
+            frame.pict_type = PictureType.NONE  # the encoder chooses its own
+            target.mux(encoder.encode(frame))
+        target.mux(encoder.encode())

@@ -4,9 +4,7 @@
 
 The index of a batch has 100,000 vehicles of 10,000 videos; the page of a video has 1,200 vehicles
 with speeds, and flows. Times are from the start of the navigation: to the first rows, laid out, and
-to the end of the page. The page of `vdet draw` has the paths of an hour, 3,000 vehicles; a drag is
-each move of the pointer, with the counts and all that is drawn, in milliseconds: the median, and
-the slowest.
+to the end of the page.
 """
 
 import json
@@ -26,14 +24,11 @@ import numpy as np
 
 from benchmarks.pole_cameras import HEIGHT, WIDTH
 from vdet.boxes import Box
-from vdet.config.schema import Settings
 from vdet.media import VideoInfo
 from vdet.pages.batch import write_index
-from vdet.pages.drawing import Drawing
 from vdet.pages.render import jpeg_uri
 from vdet.pages.video import VideoPage
 from vdet.track.track import State
-from vdet.traffic.linking import VehiclePath
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import Speeds
 
@@ -51,69 +46,6 @@ for (const [name, value] of Object.entries({json.dumps(FILTERS)})) {{
   taken[name] = performance.now() - begin;
 }}
 document.title = JSON.stringify(taken);
-</script></body>"""
-
-PLACES: dict[str, Any] = {
-    "traffic": {
-        "lines": [
-            {"name": "across", "start": [0.1, 0.52], "end": [0.9, 0.58]},
-            {"name": "down", "start": [0.5, 0.25], "end": [0.52, 0.95]},
-        ],
-        "zones": [
-            {"name": "small", "points": [[0.4, 0.3], [0.6, 0.3], [0.62, 0.45], [0.38, 0.45]]},
-            {
-                "name": "large",
-                "points": [
-                    *([0.06, 0.2], [0.3, 0.12], [0.6, 0.1], [0.92, 0.22]),
-                    *([0.95, 0.6], [0.9, 0.9], [0.5, 0.96], [0.1, 0.9]),
-                ],
-            },
-        ],
-    },
-    "regions": [
-        {"name": "road", "points": [[0.02, 0.05], [0.98, 0.04], [0.97, 0.99], [0.03, 0.98]]}
-    ],
-}
-GRIPS = {
-    "a line": (192, 380),
-    "the end of a line": (1152, 417.6),
-    "a small zone": (600, 300),
-    "a corner of a large zone": (1152, 648),
-    "a large zone": (300, 500),
-    "a region": (60, 600),
-}
-DRAGS = """
-<iframe id="hold"></iframe>
-<script>
-get("hold").contentDocument.open(); // the page has loaded when it is closed
-stage.setPointerCapture = () => {};
-const send = (type, [x, y]) => {
-  const box = marks.getBoundingClientRect();
-  const [clientX, clientY] = [box.left + x * box.width / 1280, box.top + y * box.height / 720];
-  const target = document.elementFromPoint(clientX, clientY) ?? stage;
-  const begin = performance.now();
-  target.dispatchEvent(new PointerEvent(type, { clientX, clientY, pointerId: 1, bubbles: true }));
-  return performance.now() - begin;
-};
-function drag(from) {
-  window.scrollTo(0, 0);
-  send("pointerdown", from);
-  send("pointerdown", from); // the first one selects, so that there are handles
-  const move = (_, i) => send("pointermove", [from[0] + i, from[1] + i / 2]);
-  const taken = Array.from({ length: 60 }, move);
-  send("pointerup", from);
-  get("undo").click();
-  taken.sort((a, b) => a - b);
-  return [taken[30], taken[59]];
-}
-const whole = setInterval(() => {
-  if (document.body.dataset.ready !== "yes") return;
-  clearInterval(whole);
-  const taken = {};
-  for (const [name, from] of Object.entries(GRIPS)) taken[name] = drag(from);
-  document.title = JSON.stringify(taken);
-  get("hold").contentDocument.close();
-}, 50);
 </script></body>"""
 
 
@@ -194,35 +126,6 @@ def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
     return page.html()
 
 
-def hour_of_paths(vehicles: int = 3000) -> list[VehiclePath]:
-    """Return the paths of an hour: in all directions, on bends, 12.5 places a second."""
-    rng, paths = np.random.default_rng(1), []
-    for number in range(1, vehicles + 1):
-        seen, first = int(rng.integers(100, 400)), float(rng.random() * 3570)
-        angles = rng.uniform(0, 2 * np.pi) + np.linspace(0, rng.normal(0, 0.6), seen)
-        steps = np.stack([np.cos(angles), 0.6 * np.sin(angles)], axis=1) * rng.uniform(400, 1300)
-        feet = (
-            rng.uniform((300, 200), (980, 600))
-            + (np.cumsum(steps, axis=0) - steps.sum(0) / 2) / seen
-        )
-        points = feet + rng.normal(0, 0.5, feet.shape)
-        heights = np.rint(np.clip(20 + points[:, 1] / 12, 12, 80))
-        name = CLASSES[rng.integers(len(CLASSES))]
-        times, empty = first + np.arange(seen) / 12.5, np.zeros(seen)
-        rows = times, points, heights, empty, empty
-        paths.append(VehiclePath(number, name, seen, *rows, empty + number, heights.max()))
-    return paths
-
-
-def draw_page() -> str:
-    """Return the page of `vdet draw` of an hour."""
-    rng = np.random.default_rng(1)
-    place = rng.integers(0, 255, (45, 80, 3)).astype(np.uint8).repeat(16, 0).repeat(16, 1)
-    drawing = Drawing(place, [], Settings(), PLACES)
-    drawing.paths = hour_of_paths()
-    return drawing.output(Path("page.html"), "gate.yaml").decode()
-
-
 def in_chromium(page: Path, changes: Mapping[str, str]) -> Any:
     """Return what scripts in a page, put in place of some of its texts, write as its title."""
     copy, html = page.with_name("acts.html"), page.read_text("utf-8")
@@ -245,12 +148,6 @@ def main() -> None:
         if shutil.which("chromium"):
             for what, taken in in_chromium(page, {UPDATE: FIRST, "</body>": MEASURES}).items():
                 print(f"  {what}: {taken:.0f} ms")
-        page.write_text(draw_page(), "utf-8")
-        print(f"drawing of 3,000 vehicles: {page.stat().st_size / 1e6:.1f} MB")
-        acts = DRAGS.replace("GRIPS", json.dumps(GRIPS))
-        if shutil.which("chromium"):
-            for what, (middle, most) in in_chromium(page, {"</body>": acts}).items():
-                print(f"  a drag of {what}: {middle:.1f} ms, at most {most:.1f} ms")
     video_page()  # the first one loads packages
     begin = time.process_time()
     video_page()

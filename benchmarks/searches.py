@@ -9,12 +9,11 @@ import av
 import cv2
 import numpy as np
 
-from benchmarks.material import ShippedConfig
 from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.detectors import load_detector
-from vdet.detect.svm.detector import SvmDetector
+from vdet.detect.svm.detector import SvmDetector, SvmModel
 from vdet.detect.svm.search import DenseSearch
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
@@ -28,7 +27,7 @@ _STRIDES = {"svm dense": _OF_SVM, "svm detection": _OF_SVM, "network detection":
 
 
 def search_times(
-    path: Path, pictures: Sequence[Picture], svm: ShippedConfig, seed: ShippedConfig, rounds: int
+    path: Path, pictures: Sequence[Picture], svm: SvmModel, seed: SvmModel, rounds: int
 ) -> dict[str, float]:
     """Return seconds for a frame of a video, for the dense searches and their references.
 
@@ -49,11 +48,11 @@ def search_times(
     return per_frame | _decoding(path, svm, pictures, rounds)
 
 
-def _search(config: ShippedConfig, pictures: Sequence[Picture], engine: type = DenseSearch) -> Task:
+def _search(config: SvmModel, pictures: Sequence[Picture], engine: type = DenseSearch) -> Task:
     """Search the pictures."""
     width, height = pictures[0].width, pictures[0].height
     with patch("vdet.detect.svm.detector.DenseSearch", engine):
-        search = SvmDetector(config.model, config.settings.svm, width, height)
+        search = SvmDetector(config.model, config.settings, width, height)
 
     def run() -> None:
         for picture in pictures:
@@ -89,7 +88,7 @@ def _detect_multi_scale(pictures: Sequence[Picture]) -> Task:
 
 
 def _decoding(
-    path: Path, svm: ShippedConfig, pictures: Sequence[Picture], rounds: int
+    path: Path, svm: SvmModel, pictures: Sequence[Picture], rounds: int
 ) -> dict[str, float]:
     """Time decoding to planes with one thread, interleaved with search and network."""
 
@@ -113,9 +112,7 @@ def _decoding(
     }
 
 
-def times_by_height(
-    pictures: Sequence[Picture], svm: ShippedConfig, rounds: int
-) -> dict[int, float]:
+def times_by_height(pictures: Sequence[Picture], svm: SvmModel, rounds: int) -> dict[int, float]:
     """Return the dense search's seconds a frame for frames of several heights."""
     images = [picture.image for picture in pictures[:3]]
     tasks: dict[str, Task] = {}

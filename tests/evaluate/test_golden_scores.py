@@ -1,4 +1,7 @@
-"""Our metrics beside those of trackeval and pycocotools, from `benchmarks/golden_scores.py`."""
+"""Our metrics beside those of trackeval and pycocotools, which each case names with versions.
+
+Ignore regions were DontCare for trackeval (its KITTI reader), and crowds for pycocotools.
+"""
 
 import json
 from dataclasses import asdict
