@@ -13,11 +13,9 @@ from benchmarks.pole_cameras import HEIGHTS, KINDS, pole_scene
 from benchmarks.unseen import deal
 
 from vdet.config.schema import Settings
-from vdet.labels.reading import read_labelled_images
-from vdet.labels.roles import Roles
-from vdet.synthetic.render import Renderer
+from vdet.labels.reading import Roles, read_labelled_images
+from vdet.synthetic.render import Renderer, true_boxes
 from vdet.synthetic.scene import demo_scene
-from vdet.synthetic.truth import true_boxes
 
 NEW = (
     *("bdd_empty_roads", "bdd_night", "bdd_rain", "bdd_trucks_day", "delhi_junctions"),
