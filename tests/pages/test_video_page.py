@@ -12,12 +12,14 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
+from browser import browser
 from pages.html import Elements, needs_chromium, title_in_chromium
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.findings import Finding
+from vdet.pages.counts import counts_page
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.track.track import FrameTracks
@@ -267,6 +269,22 @@ def test_the_times_of_its_vehicles_seek_the_player(tmp_path: Path, player: Playe
         [True, times[0], "#1\tvehicle\t0:00:00\t2.0\tleft\tnear"],
         [False, times[1], "#2\ttruck\t0:00:02\t0.1\tleft\tfar"],
     ]  # fmt: skip
+
+
+def test_doubts_come_before_tables_on_the_first_page_of_paper(tmp_path: Path) -> None:
+    dark = Finding("dark", "the image is dark", spans=((0.0, 1.0),))
+    counts = replace(counted(("gate", "in", 1.0), ("gate", "out", 1.2)), findings=(dark,))
+    made = replace(page(), survey=survey(counts), findings=(dark,))
+    with browser(tmp_path, 794, 1123) as window:  # A4 at 96 dpi
+        for html in (made.html(), counts_page(survey(counts), STILL)):
+            (path := tmp_path / "page.html").write_text(html, "utf-8")
+            window.visit(path)
+            window.show_print()
+            doubts, *others = window.run(
+                "return ['.problems', 'h2 ~ .still', 'h2 ~ .wide'].map(selector =>"
+                " document.querySelector(selector).getBoundingClientRect().bottom)"
+            )
+            assert doubts < min(*others, 1123)
 
 
 @needs_chromium

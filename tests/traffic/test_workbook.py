@@ -3,6 +3,7 @@
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -22,14 +23,16 @@ from vdet.traffic.workbook import Sheet, SheetTable, write_workbook
 from vdet.version import __version__
 
 LINES = {"north": "N", "east": "E", "south": "S"}
+CORNERS = (0.2, 0.2), (0.8, 0.2), (0.8, 0.8), (0.2, 0.8)
+"""Of a junction, clockwise: the lines lie between them."""
 FORMULA = "=HYPERLINK('http://x')"
 BEGIN = datetime.fromisoformat("2026-05-01 07:00+02:00")
 
 
 def settings(**traffic: Any) -> Settings:
     lines = [
-        {"name": name, "start": (0, 0.1 * n), "end": (1, 0.1 * n), "approach": arm}
-        for n, (name, arm) in enumerate(LINES.items(), start=1)
+        {"name": name, "approach": arm, "start": start, "end": end, "left": "out", "right": "in"}
+        for (name, arm), start, end in zip(LINES.items(), CORNERS, CORNERS[1:], strict=False)
     ]
     survey = {"site": FORMULA, "surveyor": "A. Smith", "weather": "dry"}
     values = {"lines": lines, "interval": "30min", "pcu": {"lorry": 2.5}} | traffic
@@ -161,8 +164,8 @@ def table(text: str) -> list[str]:
 def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> None:
     empty = " -" * 13
     line = "east: this line is shorter than a vehicle; make it longer [line]"
-    doubts = f"{line}; the image is dark [dark]".replace(" ", "_")
-    heavy = HEAVY_NAMED.replace(" ", "_")
+    texts = (*wrap(f"{line}; the image is dark [dark]", 80), *wrap(HEAVY_NAMED, 80))
+    doubt, other, heavy, right = (text.replace(" ", "_") for text in texts)
     facts = f"""
         {FORMULA} - {empty}
         surveyor A._Smith {empty}
@@ -175,8 +178,10 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
         clock from_its_name {empty}
         interval 30min {empty}
         checked 20_of_70_minutes {empty}
-        conditions {doubts} {empty}
+        conditions {doubt} {empty}
+        - {other} {empty}
         heavy_share {heavy} {empty}
+        - {right} {empty}
         program vdet_{__version__} {empty}
         - - {empty}
         Checks - {empty}
@@ -253,15 +258,24 @@ def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) 
         {part}   north east   {NOTHING}
         {part}   south north  {NOTHING}
         {part}   east  (none) 1 6 0 0 1 0   1""")
-    assert sheets["Turning movements"] == table(
-        f"""
+    assert sheets["Turning movements"] == table(f"""
+        1_of_4_vehicles_without_an_origin_or_a_destination{" -" * 19}
         start end observed,_s part N_left N_through N_right N_U-turn N_all
             E_left E_through E_right E_U-turn E_all S_left S_through S_right S_U-turn S_all
-        {first[:-2]}  1 1 0 0 2 0 0 0 0 0 0 0 0 0 0
-        {second[:-2]} 0 0 0 0 0 0 0 0 0 0 0 1 0 0 1
-        {part[:-2]}   0 0 0 0 0 0 0 0 0 0 0 0 0 0 0
-        all - - - 1 1 0 0 2 0 0 0 0 0 0 1 0 0 1""".replace("\n            ", " ")
-    )
+            from_E_to_unknown
+        {first[:-2]}  1 1 0 0 2 0 0 0 0 0 0 0 0 0 0 0
+        {second[:-2]} 0 0 0 0 0 0 0 0 0 0 0 1 0 0 1 0
+        {part[:-2]}   0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 1
+        all - - - 1 1 0 0 2 0 0 0 0 0 0 1 0 0 1 1""")
+
+
+def test_who_leaves_a_junction_without_having_entered_comes_from_unknown(tmp_path: Path) -> None:
+    video = counts(BEGIN, 60, event(5, "south", "out", 1, "car"), event(6, "east", "in", 2, "car"))
+    sheets = lines_of(written(tmp_path / "c.xlsx", Survey({"a": video}, settings())))
+    title, headings, *_, total = sheets["Turning movements"]
+    assert title.startswith("2_of_2_vehicles_without")
+    assert headings.split()[-2:] == ["from_unknown_to_S", "from_E_to_unknown"]
+    assert total == "all - - -" + " 0" * 15 + " 1 1"
 
 
 def test_zones_vehicles_files_and_notes(book: Path) -> None:
@@ -301,10 +315,18 @@ def test_sheets_are_ready_to_print(book: Path) -> None:
     summary, *single = openpyxl.load_workbook(book)
     assert [len(summary._images), summary.page_setup.fitToHeight] == [1, None], "on one page"
     for sheet in single:
+        top = 2 if sheet.title == "Turning movements" else 1
+        printed = (f"$1:${top}", "") if sheet.title != "Vehicles" else (None, "$K$1")
         assert sheet.page_setup.orientation == "landscape"
         assert sheet.sheet_properties.pageSetUpPr.fitToPage
-        assert (sheet.page_setup.fitToHeight, sheet.print_title_rows) == (0, "$1:$1")
-        assert (sheet.freeze_panes, sheet.auto_filter.ref) == ("A2", sheet.dimensions)
+        assert sheet.page_setup.fitToHeight == 0
+        assert (sheet.print_title_rows, sheet.print_area.rpartition("!")[2]) == printed
+        assert sheet.freeze_panes == f"A{top + 1}"
+        assert sheet.auto_filter.ref == sheet.dimensions.replace("A1", f"A{top}")
+        height = sheet.row_dimensions[top].height or 15
+        for cell in sheet[top]:
+            width = int(sheet.column_dimensions[cell.column_letter].width)
+            assert height >= 15 * len(wrap(cell.value, width)), "the heading covers no row"
     assert single[0].column_dimensions["A"].width > len("2026-05-01 07:00:00")
     assert single[-1].column_dimensions["B"].width < 90, "long text is wrapped"
 

@@ -4,11 +4,13 @@ The peak hour and its factor are those of the Highway Capacity Manual: the four 
 of an hour with the most vehicles, and their number divided by four times that of the busiest.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from vdet.config.scene import Approach
+import numpy as np
+
+from vdet.config.scene import Approach, LineSettings
 from vdet.traffic.clock import ClockTime, Interval
 
 QUARTER = 900
@@ -46,6 +48,23 @@ def peak_hour(quarters: Sequence[Interval], vehicles: Mapping[int, int]) -> Peak
             factor = round(sum(numbers) / (4 * max(numbers)), 2)
             peak = PeakHour(hour[0].start, sum(numbers), factor)
     return peak
+
+
+def exits(lines: Iterable[LineSettings]) -> set[tuple[str, str]]:
+    """Return the directions, with the names of the lines, that lead out of a junction.
+
+    A vehicle leaves by an arm if it goes away from the middle of the lines of all arms.
+    """
+    arms = [line for line in lines if line.approach]
+    ends = [(np.divide(arm.start, arm.size), np.divide(arm.end, arm.size)) for arm in arms]
+    middle = np.mean(ends, axis=(0, 1)) if arms else None
+    found = set()
+    for arm, (start, end) in zip(arms, ends, strict=True):
+        (x, y), (to_x, to_y) = end - start, middle - start
+        side = x * to_y - y * to_x  # of the middle; y runs down, so right is positive
+        if side:
+            found.add((arm.name, arm.left if side > 0 else arm.right))
+    return found
 
 
 def movement(origin: Approach, destination: Approach) -> str:

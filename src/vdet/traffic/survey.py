@@ -45,8 +45,9 @@ peak hour: the four successive quarters of an hour, all observed, with the most 
 factor is this number divided by four times that of the busiest quarter.
 heavy: the share of trucks and buses. all flows: each vehicle once, at its first line or zone.
 flow: from the first line or zone of a vehicle to the last, in the interval of the first. \
-{NOWHERE}: it was counted at one only; turning movements leave it out.
-turning movement: N left is from the northern arm of the junction to the left.
+{NOWHERE}: it was counted at one only.
+turning movement: N left is from the northern arm of the junction to the left. from unknown to N: \
+it was only seen to leave by this arm.
 checks: the true number of passages at all checked lines and zones, with its interval of 95 %.
 counted: by vdet. corrected, all vehicles: by reviewers. estimated: by checked spans."""
 
@@ -94,7 +95,14 @@ class Survey:
         checks = self.checks()
         top = [self.facts(), *([checks] if checks.rows else []), self.volumes()]
         summary = Sheet("Summary", top, picture)
-        return [summary, *(Sheet(name, [table]) for name, table in single.items() if table.rows)]
+        return [
+            summary,
+            *(
+                Sheet(name, [table], printed=name != "Vehicles")
+                for name, table in single.items()
+                if table.rows
+            ),
+        ]
 
     def facts(self) -> SheetTable:
         """Return what the survey is, when and how it was made, and whether it is in doubt."""
@@ -234,22 +242,30 @@ class Survey:
 
     def _movements(self) -> SheetTable:
         """Return how vehicles turn, by interval; the arms are clockwise from the north."""
-        arm_of = {line.name: line.approach for line in self.settings.traffic.lines}
+        lines = self.settings.traffic.lines
+        arm_of, exits = {line.name: line.approach for line in lines}, measures.exits(lines)
         arms = [arm for arm in measures.APPROACHES if arm in arm_of.values()]
-        turns = list(product(arms, (*measures.MOVEMENTS, _ALL)))
-        turning: dict[tuple[str, str], list[GroupedEvent]] = {turn: [] for turn in turns}
+        turns = product(arms, (*measures.MOVEMENTS, _ALL))
+        turning: dict[tuple[str, ...], list[GroupedEvent]] = {turn: [] for turn in turns}
         for (first, last), trips in self.groups.flows.items():
             origin, destination = arm_of.get(first), arm_of.get(last or NOWHERE)
             if origin and destination:
                 turning[origin, measures.movement(origin, destination)] += trips
                 turning[origin, _ALL] += trips
+            for trip in trips if origin and not last else ():
+                is_exit = (first, trip.event.direction) in exits
+                ends = ("unknown", "to", origin) if is_exit else (origin, "to", "unknown")
+                turning.setdefault(("from", *ends), []).append(trip)
         tally = self.groups.tally(turning, self.settings.traffic.seconds)
         rows: list[list[Cell]] = [
-            [*_interval(period), *(tally.numbers[period.number, turn, None] for turn in turns)]
+            [*_interval(period), *(tally.numbers[period.number, turn, None] for turn in turning)]
             for period in tally.intervals.periods
         ]
-        rows.append([_ALL, None, None, None, *(len(turning[turn]) for turn in turns)])
-        return SheetTable([*_TIMES, *map(" ".join, turns)], rows if arms else [])
+        rows.append([_ALL, None, None, None, *map(len, turning.values())])
+        every = sum(map(len, self.groups.flows.values()))
+        lost = every - sum(len(turning[arm, _ALL]) for arm in arms)
+        title = f"{lost} of {quantity(every, 'vehicle')} without an origin or a destination"
+        return SheetTable([*_TIMES, *map(" ".join, turning)], rows if arms else [], title)
 
     def _zones(self) -> SheetTable:
         """Return the use of zones in each interval."""
