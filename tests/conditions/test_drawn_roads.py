@@ -13,8 +13,10 @@ from vdet.conditions import visibility
 from vdet.conditions.visibility import VisibilityWatch
 from vdet.conditions.watch import Conditions, planes_of
 from vdet.config.schema import Code, ConditionSettings, Settings
+from vdet.lanes.road import Lane
 from vdet.media import Picture
 from vdet.media.frame import Coding, Planes
+from vdet.track.track import Track
 
 
 @pytest.fixture(scope="module")
@@ -75,9 +77,17 @@ def test_what_the_settings_make_doubtful_is_said() -> None:
     assert found(SETTINGS) == []
 
 
-def test_a_camera_that_is_described_has_metres() -> None:
-    described = load_settings("project-camera", ["lanes.enabled=true"])
-    assert found(described) == []
+@pytest.mark.parametrize(
+    ("lanes", "distance", "codes"), [(1, 40.0, []), (1, None, ["lane"]), (0, None, ["lane"])]
+)
+def test_a_camera_that_is_described_has_metres_unless_there_is_no_lane_or_distance(
+    lanes: int, distance: float | None, codes: list[str]
+) -> None:
+    conditions = Conditions(load_settings("project-camera", ["lanes.enabled=true"]), 640)
+    lane, track = Mock(Lane), Mock(Track, distance=distance)
+    for number in range(10):
+        conditions.add_road(lane if number < lanes else None, [track])
+    assert [finding.code for finding in conditions.findings().items] == codes
 
 
 def test_a_plane_is_the_same_from_a_decoder_and_from_an_image() -> None:

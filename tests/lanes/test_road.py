@@ -83,6 +83,12 @@ def test_no_lane_is_found_if_one_line_was_never_seen(missing: float) -> None:
     assert drive(scene) == [None] * scene.frames
 
 
+def test_a_verge_is_no_line() -> None:
+    verge = (LaneLine(1.85 + 0.5 * number, PALE, dash=3.0) for number in range(4))
+    scene = make_road(lines=(LaneLine(-1.85), *verge))
+    assert drive(scene) == [None] * scene.frames
+
+
 @pytest.mark.parametrize("missing", [-1.85, 1.85])
 def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost_until_it_reappears(
     missing: float,

@@ -1,6 +1,7 @@
 """Watches the conditions of one video: small planes of its frames, and their detections."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -17,6 +18,9 @@ from vdet.findings import Finding, Findings, at_places, without
 from vdet.media import Picture
 from vdet.track.track import Track
 
+if TYPE_CHECKING:  # loaded with `--lanes`
+    from vdet.lanes.road import Lane
+
 _STEP = 0.19
 """Minimum seconds between two planes; searches of an empty road are 0.2 to 0.25 seconds apart."""
 _WIDTH = 320
@@ -25,6 +29,8 @@ _MOST = 3
 """Maximum number of cuts that a finding names."""
 _NARROW = 320
 """Minimum width of the frames that the detectors were measured on, pixels."""
+_FEW = 0.1
+"""Fraction of the frames; a lane that is found in fewer is doubtful."""
 
 
 class Conditions:
@@ -45,6 +51,8 @@ class Conditions:
         self._visibility = visibility.VisibilityWatch(is_shipped=is_shipped)
         self._time: float | None = None
         self._cuts: list[float] = []
+        self._frames = self._lanes = self._rows = self._placed = 0
+        """Number of frames, of those with a lane, of boxes, and of those with a distance."""
 
     def cut(self, time: float) -> None:
         """Begin anew with the next frame, before which there is a jump cut."""
@@ -68,6 +76,13 @@ class Conditions:
         self._motion.add(time, plane, boxes, is_steady=is_steady)
         self._weak.add(time, picture, detections, tracks)
 
+    def add_road(self, lane: "Lane | None", tracks: Sequence[Track]) -> None:
+        """Add the lane of a frame, and the vehicles on the road."""
+        self._frames += 1
+        self._lanes += lane is not None
+        self._rows += len(tracks)
+        self._placed += sum(track.distance is not None for track in tracks)
+
     @property
     def is_moving(self) -> bool:
         """Whether the camera moved in more than a tenth of the planes so far."""
@@ -78,6 +93,12 @@ class Conditions:
         settings, findings = self._settings, []
         if settings.lack_of_metres:
             findings.append(Finding("lane-geometry", settings.lack_of_metres, severity="note"))
+        if self._lanes < _FEW * self._frames:
+            text = f"the lane was found in {self._lanes} of {self._frames} frames"
+            findings.append(Finding("lane", f"{text}: check lanes.points in --stages"))
+        elif self._rows and not (self._placed or settings.lack_of_metres):
+            text = "no box has a distance: all are cut, or farther away than lanes.points reach"
+            findings.append(Finding("lane", text))
         if self._width < _NARROW:
             text = f"frames are {self._width} pixels wide; detectors were measured on wider ones"
             findings.append(Finding("small-frames", text, severity="note"))

@@ -73,7 +73,7 @@ class LaneSettings(Shape):
 
 Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
-    "corrections", "cut", "frame-rate", "ground", "lane-geometry", "line", "nothing-found",
+    "corrections", "cut", "frame-rate", "ground", "lane", "lane-geometry", "line", "nothing-found",
     "small-frames", "traces", "uncertain",
 ]  # fmt: skip
 """What makes a result doubtful; docs/conditions.md explains each."""
@@ -98,8 +98,8 @@ class ConditionSettings(Section):
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
     """Codes of findings to suppress: camera-moves, camera-moved, unexplained-motion, dark, haze,
-    blur, drops, cut, frame-rate, ground, lane-geometry, line, nothing-found, small-frames, traces,
-    uncertain.
+    blur, drops, cut, frame-rate, ground, lane, lane-geometry, line, nothing-found, small-frames,
+    traces, uncertain.
     """
 
 

@@ -41,6 +41,8 @@ class LinePaint:
     x: Float64Array
     visible: float = 1.0
     """Fraction of all rows in which no vehicle hides the line."""
+    pixels: int = 0
+    """Number of painted pixels of the top view."""
 
 
 PAINT, HIDDEN = 255, 128
@@ -131,8 +133,12 @@ def paint_along(
     counts, moments = np.moveaxis((near == PAINT).astype(np.float32) @ weights, 2, 0)
     x = top_view.laterals[0] + (middles + moments / np.maximum(counts, 1)) / ACROSS
     return [
-        LinePaint(top_view.distances[rows], of_line[rows], float(seen.mean()))
-        for of_line, rows, seen in zip(x, (counts > 0) & visible, visible, strict=True)
+        LinePaint(
+            top_view.distances[rows], of_line[rows], float(seen.mean()), int(count[rows].sum())
+        )
+        for of_line, rows, seen, count in zip(
+            x, (counts > 0) & visible, visible, counts, strict=True
+        )
     ]
 
 
@@ -199,6 +205,10 @@ _MARKING = 4.0
 """Shortest length of paint by which a wholly visible line is seen, metres."""
 _SCATTER = 0.08
 """Largest root mean square distance of paint from its curve, metres."""
+_BESIDE, _ALONE = 0.75, 0.85
+"""Distance to each side, metres, and minimum fraction of the paint up to there that is on the line:
+it is 0.9 to 1 on painted lines, and less on verges, crossings and reflections.
+"""
 _CONVERGENCE = 1.6
 """Maximum convergence of the lines over the top view, metres; it comes from the vehicle's pitch."""
 _MIN_RADIUS = 150.0
@@ -333,7 +343,9 @@ def _fit(mask: Image, top_view: TopView, positions: LinePositions, guess: LaneCu
         positions = guess.at(top_view.distances)
     if not _is_plausible(guess, top_view):
         return FrameFit(guess, equations, (False, False))
-    seen = _is_seen(left, top_view, positions[0]), _is_seen(right, top_view, positions[1])
+    by_left, by_right = paint_along(mask, top_view, positions, _BESIDE)
+    of_left, of_right = positions
+    seen = _is_seen(left, by_left, top_view, of_left), _is_seen(right, by_right, top_view, of_right)
     if seen[0] != seen[1]:  # fit again without the paint near the unseen line
         none = LinePaint(np.empty(0), np.empty(0))
         equations = normal_equations(left if seen[0] else none, right if seen[1] else none, guess)
@@ -350,10 +362,10 @@ def _is_plausible(curves: LaneCurves, top_view: TopView) -> bool:
     )
 
 
-def _is_seen(paint: LinePaint, top_view: TopView, x: Float64Array) -> bool:
-    """Check that a line has enough paint, close enough to its curve x `(rows,)`."""
+def _is_seen(paint: LinePaint, around: LinePaint, top_view: TopView, x: Float64Array) -> bool:
+    """Check that a line has enough paint, close to its curve x `(rows,)`, and little beside it."""
     fraction = max(paint.visible, _MIN_VISIBLE)
-    if len(paint.z) < fraction * _MARKING * ALONG:
+    if len(paint.z) < fraction * _MARKING * ALONG or paint.pixels < _ALONE * around.pixels:
         return False
     distance = paint.x - np.interp(-paint.z, -top_view.distances, x)
     return float(np.sqrt(np.mean(distance**2))) <= _SCATTER

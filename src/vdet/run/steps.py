@@ -83,6 +83,7 @@ def make_steps(context: StepContext) -> list[Step]:
     """
     settings, width, height = context.settings, context.width, context.height
     steps: list[Step | None] = []
+    conditions = None
     if context.video is not None:
         from vdet.conditions.watch import Conditions
 
@@ -94,7 +95,7 @@ def make_steps(context: StepContext) -> list[Step]:
 
         lens, has_metres = settings.camera.lens, settings.lack_of_metres is None
         roads = RoadFinder(lens, settings.lanes, width, height, has_metres=has_metres)
-        steps.append(LaneStep(roads, settings.detector.tyre_height))
+        steps.append(LaneStep(roads, settings.detector.tyre_height, conditions))
     if settings.regions:
         steps.append(RegionStep(Regions(settings.regions, width, height)))
     steps += [load_plugin(STEPS, name)(context) for name in settings.steps]
@@ -104,9 +105,10 @@ def make_steps(context: StepContext) -> list[Step]:
 class LaneStep:
     """Finds the lane, and the distance and the lane of each vehicle."""
 
-    def __init__(self, roads: "RoadFinder", foot: float) -> None:
-        self._roads = roads
-        self._foot = foot
+    def __init__(
+        self, roads: "RoadFinder", foot: float, conditions: "Conditions | None" = None
+    ) -> None:
+        self._roads, self._foot, self._conditions = roads, foot, conditions
         self._masks: dict[int, Image] = {}
 
     def prepare(self, frame: Frame) -> None:
@@ -118,6 +120,8 @@ class LaneStep:
         mask = self._masks.pop(result.frame.index)
         road = self._roads.update(mask, (track.box for track in result.tracks))
         tracks = with_positions(result.tracks, road, self._foot)
+        if self._conditions:
+            self._conditions.add_road(road.lane, tracks)
         return replace(result, tracks=tracks, facts={**result.facts, "lane": road})
 
 
