@@ -61,6 +61,13 @@ def without(findings: Iterable[Finding], codes: Collection[str]) -> tuple[Findin
     return tuple(finding for finding in findings if finding.code not in codes)
 
 
+def with_counted(of_tracks: Iterable[Finding], of_counts: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings of tracks and of counts, which do not repeat that nothing was found."""
+    first = tuple(of_tracks)
+    said = {item.code for item in first} & {"nothing-found"}
+    return first + without(of_counts, said)
+
+
 def at_places(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Return the findings where lines, zones, regions or ground points are used."""
     return tuple(

@@ -4,7 +4,7 @@ import pytest
 
 from traffic.scenes import LINE, Path, counts, frames, through
 from vdet.config.scene import LineSettings
-from vdet.findings import Finding
+from vdet.findings import Finding, with_counted
 
 DOWN = through((1, 600, 300), (5, 600, 500))
 
@@ -20,6 +20,15 @@ def test_a_line_across_the_way_is_fine() -> None:
 def test_a_line_that_no_vehicle_crosses_is_noted() -> None:
     found = counts(frames(through((1, 600, 300), (5, 600, 340))), LINE).findings
     assert found == (Finding("line", "line: no vehicle crossed this line", severity="note"),)
+
+
+@pytest.mark.parametrize("paths", [(), (lambda _: (600, 300),)], ids=["no track", "a parked car"])
+def test_that_nothing_was_found_is_noted_once(paths: tuple[Path, ...]) -> None:
+    found = counts(frames(*paths), LINE).findings
+    assert [(item.code, item.severity) for item in found] == [("nothing-found", "note")]
+    of_tracks = (Finding("nothing-found", "3 things moved"),)
+    assert with_counted(of_tracks, found) == of_tracks
+    assert with_counted((), found) == found
 
 
 @pytest.mark.parametrize(

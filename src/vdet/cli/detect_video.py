@@ -243,9 +243,10 @@ def _process_video(run: "Run") -> bool:
     if totals.corrected:
         announce(f"{run.source}: {totals.corrected}")
     findings = findings_in(totals.facts)
-    announce_notes(run.source, findings.items)
     if findings.nothing_moved:
         announce(f"{run.source}: no vehicle was found, and nothing moved")
+    else:
+        announce_notes(run.source, findings.items)
     return bool(warnings_in(findings.items))
 
 

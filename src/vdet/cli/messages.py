@@ -52,8 +52,9 @@ def announce(*lines: str) -> None:
 
 
 def announce_notes(name: "Path | str", findings: "Iterable[Finding]") -> None:
-    """Print the notes about lines among the findings about a file."""
-    notes = (item for item in findings if (item.severity, item.code) == ("note", "line"))
+    """Print the notes about lines, and that nothing was found, among the findings about a file."""
+    codes = "line", "nothing-found"
+    notes = (item for item in findings if item.severity == "note" and item.code in codes)
     announce(*(f"vdet: note: {name}: {note}" for note in notes))
 
 

@@ -190,7 +190,11 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
 
 def _line_findings(lines: Sequence[Line], passages: Sequence[_PathEvents]) -> Iterator[Finding]:
     """Yield each problem of a line that the tracks of a run show."""
-    for line in lines if passages else ():
+    if lines and not passages:
+        text = "no vehicle crossed a line; if there was traffic, move the line"
+        yield Finding("nothing-found", text, severity="note")
+        return
+    for line in lines:
         crossed = [heights for passage in passages if (heights := passage.heights[line.name])]
         tolerated = _FEW_WRONG * len(crossed)
         missed = sum(line.name in passage.missed for passage in passages)

@@ -11,7 +11,7 @@ from pathlib import Path
 from vdet.config.classes import standard_class
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
-from vdet.findings import Finding, at_places, without
+from vdet.findings import Finding, at_places, with_counted, without
 from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.labels.reading import read_head, read_tracks
 from vdet.lanes.ground import ground_of
@@ -188,7 +188,7 @@ class _CountedVideo:
             events=tuple(events),
             spans=spans,
             clock=self.clock,
-            findings=(*self.findings, *group.findings),
+            findings=with_counted(self.findings, group.findings),
             source=self.source,
             left_out=self.start if self.start > self.first else None,
         )

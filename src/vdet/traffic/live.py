@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
 from vdet.files import valid_text
-from vdet.findings import Findings, without
+from vdet.findings import Findings, with_counted, without
 from vdet.lanes.ground import ground_of
 from vdet.media import VideoInfo
 from vdet.track.track import FrameTracks
@@ -107,7 +107,8 @@ class LiveTraffic:
         """
         self._ended = self._records.end(self.speeds, is_still=findings.is_still)
         if counts := self.counts():
-            self.counted = replace(counts, findings=(*findings.items, *counts.findings))
+            of_all = with_counted(findings.items, counts.findings)
+            self.counted = replace(counts, findings=of_all)
             self.revise(self.counted)
         else:
             self._choose()
