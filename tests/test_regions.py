@@ -7,6 +7,7 @@ import numpy as np
 import PIL.Image
 import pytest
 
+from vdet import load_settings
 from vdet.config.scene import RegionSettings
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, ImageError
@@ -26,6 +27,14 @@ def test_a_point_counts_where_it_is_included_and_not_excluded() -> None:
     assert regions.contains((200, 120))
     assert not regions.contains((60, 120))
     assert not regions.contains((270, 130))
+
+
+@pytest.mark.parametrize("row", [0.63, 0.75, 0.93])
+def test_ahead_is_the_lane_of_a_dashcam_without_the_kerb(row: float) -> None:
+    regions = Regions(load_settings("ahead").regions, 1000, 1000)
+    half = 40 + 250 * (row - 0.63) / 0.3  # of the lane in `LaneSettings`
+    for offset, is_ahead in ((0, True), (0.9, True), (-0.9, True), (1.4, False), (-1.4, False)):
+        assert regions.contains((500 + offset * half, 1000 * row)) == is_ahead
 
 
 class TestMasks:

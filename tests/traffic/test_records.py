@@ -39,6 +39,10 @@ def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
     assert found.largest == boxes[1]
 
 
+def test_what_one_frame_shows_has_no_record() -> None:
+    assert records(frame(0), frame(1, track(1, PLACE)), frame(2)) == []
+
+
 def test_the_smallest_distance_and_the_usual_lane_are_kept() -> None:
     places = [(30.0, -1), (0.0, 0), (25.0, 0), (None, None)]
     frames = (

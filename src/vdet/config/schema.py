@@ -238,7 +238,8 @@ class Settings(Section):
     classes: ClassNames = Field((), max_length=100)
     """Classes of vehicles to show and count, out of detector.classes. []: all.
 
-    The class is that of the track: the current one in boxes, the final one everywhere else.
+    The class is that of the track: in boxes the one two seconds later, everywhere else the final
+    one.
     """
     steps: tuple[str, ...] = ()
     """Names of steps of other packages to run between the tracker and the outputs, in order."""

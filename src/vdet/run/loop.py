@@ -35,6 +35,9 @@ FIRST_FRAMES = 2
 _MAX_WAITING = 60
 """Maximum number of frames in memory that wait for later ones."""
 
+_DECIDED = Fraction(2)
+"""Seconds of later frames that decide whether a track is of the selected classes."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
@@ -118,6 +121,20 @@ def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[Fram
             yield waiting.popleft()
     while waiting:
         yield waiting.popleft()
+
+
+def with_later_classes(results: Iterable[FrameResult]) -> Iterator[FrameResult]:
+    """Yield results in which tracks have the class that they have `_DECIDED` later."""
+    classes: dict[int, str | None] = {}
+
+    def read() -> Iterator[FrameResult]:
+        for result in results:
+            classes.update((track.id, track.class_name) for track in result.tracks)
+            yield result
+
+    for result in _delayed(read(), _DECIDED):
+        tracks = (replace(track, class_name=classes[track.id]) for track in result.tracks)
+        yield replace(result, tracks=tuple(tracks))
 
 
 @dataclass(frozen=True, slots=True)

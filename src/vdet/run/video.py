@@ -21,7 +21,7 @@ from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
 from vdet.run.inputs import input_files
-from vdet.run.loop import Parts, build, named_errors, peek
+from vdet.run.loop import Parts, build, named_errors, peek, with_later_classes
 from vdet.run.result import FINDINGS, Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
@@ -248,7 +248,7 @@ class Results(Iterator[FrameResult]):
             self.corrections = _corrections(run, traffic.source)
             yield None
             with closing(results):
-                for result in results:
+                for result in with_later_classes(results) if settings.classes else results:
                     if self._with_traffic:
                         traffic.add(result.frame_tracks)
                     yield result.of_classes(settings.classes)

@@ -29,6 +29,9 @@ Shorter movements are jitter of the boxes.
 _STANDING = 60.0
 """Seconds after which a vehicle that has not moved is standing."""
 
+_GLIMPSE = 0.05
+"""Seconds; what is shown for less, such as in one frame at the edge of a region, has no record."""
+
 Motion = Literal["drove", "standing", "unknown"]
 """Whether a vehicle moved, as seen by a still camera; "unknown": it did not, but was shown for less
 than a minute.
@@ -194,7 +197,11 @@ class VehicleRecords:
         self._show()
         for number, speeds in (meter.speeds() if meter else {}).items():
             self._vehicles[number].speeds = speeds
-        records = [record for _, record in sorted(self._vehicles.items())]
+        records = [
+            record
+            for _, record in sorted(self._vehicles.items())
+            if not 0 < record.seconds < _GLIMPSE
+        ]
         if is_still:
             for record in records:
                 record.judge()
