@@ -10,9 +10,13 @@ y2 in pixels of the input, score, class.
 import sys
 
 import numpy as np
-import onnx
 from numpy.typing import ArrayLike
-from onnx import ModelProto, compose, numpy_helper, parser, version_converter
+
+try:
+    import onnx
+    from onnx import ModelProto, compose, numpy_helper, parser, version_converter
+except ImportError:
+    sys.exit("onnx is not installed; pip install onnx")
 
 OPSET = 17
 RT_DETR = """

@@ -2,16 +2,22 @@
 
 from itertools import chain
 from pathlib import Path
+from statistics import fmean
 
 import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_lines, progress_bar, progress_bars
+from vdet.cli.messages import LOG, print_lines, progress_bar, progress_bars
 from vdet.cli.options import Paths, SettingsSource
 from vdet.errors import needing, quantity
 from vdet.files import OutputFiles
 from vdet.workers import limit_library_threads
+
+_AVERAGED = 100
+"""Number of steps whose mean loss is printed."""
+_FEW_STEPS = 500
+"""Number of steps below which a network from random weights finds nothing."""
 
 
 @command()
@@ -116,7 +122,10 @@ def mine(
     multiple=True,
     help="Also train on every fourth frame of a labelled video. Can be repeated.",
 )
-@options.input_file("--base", help="Start from the weights of this network of vdet train-net.")
+@options.input_file(
+    "--base",
+    help="Start from the weights of this network of vdet train-net; default is the shipped one.",
+)
 @click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),
@@ -150,6 +159,9 @@ def train_net(
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
+    from vdet.detect.onnx.detector import SHIPPED
+
+    base = SHIPPED if base == Path("default") else base
     inputs = source.inputs(*data, *chain(*clips), *([base] if base else ()))
     files = OutputFiles(overwrite=overwrite, inputs=inputs)
     files.check(output, suffixes=(".onnx",), noun="networks")
@@ -164,9 +176,11 @@ def train_net(
     sources = [image_source(read_labelled_images(path, roles), settings) for path in data]
     sources += [clip_source(clip, truth, settings) for clip, truth in clips]
     print_lines(*(line for source in sources for line in source.lines()), "")
-    with progress_bar(total=settings.train.net.steps, unit=" steps") as bar:
+    steps, losses = settings.train.net.steps, list[float]()
+    with progress_bar(total=steps, unit=" steps") as bar:
 
         def advance(step: int, loss: float) -> None:
+            losses.append(loss)
             bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
             bar.update(step - bar.n)
 
@@ -178,5 +192,13 @@ def train_net(
             device=device,
             overwrite=overwrite,
             progress=advance,
+        )
+    if losses:
+        first, last = fmean(losses[:_AVERAGED]), fmean(losses[-_AVERAGED:])
+        print_lines(f"loss: {first:.3f} at the start, {last:.3f} at the end")
+    if not base and steps < _FEW_STEPS:
+        advice = "set more train.net.steps, or --base default"
+        LOG.warning(
+            "%s: finds nothing after %d steps from random weights; %s", output, steps, advice
         )
     print_lines(f"{output}: written")

@@ -1,5 +1,7 @@
 """`docs/convert_network.py`: YOLOX and RT-DETR in a form that is read."""
 
+import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -82,3 +84,9 @@ def test_yolox(tmp_path: Path) -> None:
     )
     assert boxes.scores.tolist() == pytest.approx([0.8])
     assert not len(detect(parser.parse_model(content), path, (0, 0, 255)))
+
+
+def test_without_onnx_it_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    with pytest.raises(SystemExit, match="onnx is not installed; pip install onnx"):
+        runpy.run_path("docs/convert_network.py")

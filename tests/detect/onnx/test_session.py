@@ -22,3 +22,9 @@ def test_weights_in_other_files_are_refused(
         ):
             Session(path)
     assert capfd.readouterr().err == ""
+
+
+def test_a_network_of_another_form_is_named_with_the_way_to_onnx(tmp_path: Path) -> None:
+    (tmp_path / "net.xml").write_text("<net/>", encoding="utf-8")
+    with pytest.raises(ModelError, match=r"net\.xml: is a file of OpenVINO; export the network as"):
+        Session(tmp_path / "net.xml")

@@ -1,12 +1,15 @@
 """`vdet train-net`: from labelled pictures of each form to a network, and on after a stop."""
 
 import json
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from conftest import Run
 from labels.writers import WRITERS, Boxed, Labelled, write_coco
+from vdet.detect.onnx.detector import SHIPPED
 from vdet.detect.onnx.network import Session, read_header
 
 torch = pytest.importorskip(
@@ -31,7 +34,10 @@ def write_set(folder: Path, form: str = "COCO", *boxes: Boxed) -> Path:
 def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path, form: str) -> None:
     folder, output = write_set(tmp_path / "my_set", form), tmp_path / "net.onnx"
     result = run("train-net", folder, "-o", output, *QUICK, code=0)
-    assert result.out.splitlines()[0] == "my_set: 2 images; 2 car"
+    first, *_, loss, written = result.out.splitlines()
+    assert (first, written) == ("my_set: 2 images; 2 car", f"{output}: written")
+    assert re.fullmatch(r"loss: \d+\.\d{3} at the start, \d+\.\d{3} at the end", loss)
+    assert "finds nothing after 2 steps from random weights; set more" in result.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.onnx"]
     picture = next(folder.rglob("a.png"))
     run("detect-image", picture, "-c", "net", "--model", output, "--json", "-", code=0)
@@ -67,15 +73,22 @@ def test_a_training_that_was_stopped_before_its_end_is_written_without_a_step(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["net.onnx", "set"]
 
 
+def provenance(network: Path) -> dict[str, Any]:
+    header = read_header(Session(network))
+    assert header is not None
+    return dict(header.provenance)
+
+
 def test_a_network_has_learnt_from_the_sets_of_its_base_too(run: Run, tmp_path: Path) -> None:
     base, output = tmp_path / "base.onnx", tmp_path / "net.onnx"
     run("train-net", write_set(tmp_path / "one"), "-o", base, *QUICK, code=0)
     command = ("train-net", write_set(tmp_path / "two"), "-o", output, *QUICK)
     run(*command, "--base", base, code=0)
-    header = read_header(Session(output))
-    assert header is not None
-    assert header.provenance["report"]["sources"][0]["name"] == "two"
-    assert header.provenance["base"]["report"]["sources"][0]["name"] == "one"
+    report = provenance(output)["report"], provenance(output)["base"]["report"]
+    assert [item["sources"][0]["name"] for item in report] == ["two", "one"]
+    result = run(*command, "--base", "default", "--overwrite", code=0)
+    assert provenance(output)["base"] == provenance(SHIPPED)
+    assert "finds nothing" not in result.err
 
 
 def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path: Path) -> None:

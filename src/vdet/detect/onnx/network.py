@@ -25,6 +25,7 @@ Array = npt.NDArray[Any]
 
 MAX_BYTES = 500_000_000
 """Maximum size of an ONNX file."""
+_OTHER_FORMS = {".xml": "OpenVINO", ".pt": "PyTorch", ".tflite": "TensorFlow Lite"}
 _SILENT = 4  # log level of onnxruntime, because every error is also raised
 
 
@@ -65,6 +66,9 @@ class Session:
             self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
             self.inputs = self._session.get_inputs()
         except Exception as error:  # onnxruntime raises its own kinds, and built-in ones
+            if form := _OTHER_FORMS.get(path.suffix.lower()):
+                advice = "export the network as ONNX (of Ultralytics: yolo export format=onnx)"
+                raise ModelError(f"{path}: is a file of {form}; {advice}") from error
             raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
 
     def run(self, values: Array) -> list[Array]:
