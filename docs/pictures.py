@@ -25,7 +25,7 @@ from vdet.synthetic.scene import (
 
 FOLDER = Path(__file__).parent
 COUNTED_FRAME = 62  # of the demo's pole: half of the vehicles are counted
-STAGES = ("1-windows", "2-hits", "3-heat", "5-boxes")
+STAGES = ("1-windows", "3-hits", "4-heat", "6-boxes")
 
 _SEED = 11
 _VAN = Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12)

@@ -49,7 +49,10 @@ def test_a_picture_of_every_stage(run: Run, picture: Path, model_path: Path) -> 
     stages = picture.parent.parent / "stages"
     result = run("detect-image", picture, "--stages", stages, "--model", model_path, code=0)
     assert result.err.endswith(f"{stages}: written\n")
-    names = ["1-windows.png", "2-hits.png", "3-heat.png", "4-threshold.png", "5-boxes.png"]
+    names = [
+        *("1-windows.png", "2-features.png", "3-hits.png", "4-heat.png", "5-threshold.png"),
+        "6-boxes.png",
+    ]
     assert sorted(p.name for p in stages.iterdir()) == names
     for name in names:
         assert read_image(stages / name).shape == (180, 320, 3)

@@ -72,8 +72,8 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
         list(run_images([job], (), ImageSearch(model_for(settings), settings), OutputFiles()))
     assert not list((tmp_path / "without").glob("*regions*"))
     names = sorted(path.name for path in (tmp_path / "with").iterdir())
-    assert names[-2:] == ["5-regions.png", "6-boxes.png"]
-    picture = read_image(tmp_path / "with" / "5-regions.png")
+    assert names[-2:] == ["6-regions.png", "7-boxes.png"]
+    picture = read_image(tmp_path / "with" / "6-regions.png")
     assert picture[220, 40].max() < 60, "it is dark outside"
     assert np.array_equal(picture[220, 200], road(CAR)[220, 200])
 

@@ -184,4 +184,4 @@ def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:
         write(Output("stages", tmp_path / "stages"), results[1:3])
     assert not (tmp_path / "stages").exists()
     write(Output("stages", tmp_path / "stages"), results[1:4])
-    assert (tmp_path / "stages" / "5-boxes.png").exists()
+    assert (tmp_path / "stages" / "6-boxes.png").exists()

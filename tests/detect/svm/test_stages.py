@@ -8,10 +8,9 @@ from vdet.boxes import Image
 from vdet.config.kinds import WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.detect.svm.detector import Heat, SvmModel, blend_heat
+from vdet.detect.svm.detector import Heat, SvmModel, blend_heat, draw_features
 from vdet.media import Picture
 
-NAMES = ["windows", "hits", "heat", "threshold"]
 ROWS = SETTINGS.svm
 SMALLER_SET = scale_lengths(WindowSettings(size=24, overlap=0.5, top=100, bottom=160), SCALE)
 
@@ -40,6 +39,18 @@ def test_every_window_set_has_a_grid_of_its_own_colour() -> None:
     one, two = colors(ROWS), colors(more)
     assert any(max(color) == 255 for color in one)
     assert sum(max(color) == 255 for color in two) > sum(max(color) == 255 for color in one)
+
+
+def test_strokes_run_along_edges_and_bars_count_pixels() -> None:
+    features = ROWS.features
+    patch = np.full((features.patch, features.patch, 3), 40, np.uint8)
+    patch[:, features.patch // 2 - 1 :] = 200
+    enlarged, strokes, bars = np.split(draw_features(patch, features), 3, axis=1)
+    assert (enlarged[:, :150].max(), enlarged[:, 250:].min()) == (40, 200)
+    rows, columns = np.nonzero(strokes.max(axis=2) > 200)
+    assert len(rows)
+    assert np.ptp(rows) > 5 * np.ptp(columns)
+    assert np.count_nonzero(bars[:128].any(axis=(0, 2))) == 2 * len(bars) // features.histogram.bins
 
 
 class TestHeat:

@@ -18,7 +18,14 @@ from vdet.media.images import read_image
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 
-NAMES = ["1-windows.png", "2-hits.png", "3-heat.png", "4-threshold.png", "5-boxes.png"]
+NAMES = [
+    *("1-windows.png", "2-features.png", "3-hits.png", "4-heat.png", "5-threshold.png"),
+    "6-boxes.png",
+]
+
+
+OTHER = Box.sized(200, 60, 48, 40)
+LANES = "boxes", "tracks", "road", "above", "mask", "fit"
 
 
 def detected(*boxes: Box, time: Fraction = Fraction(0), found: Road | None = None) -> FrameResult:
@@ -47,14 +54,25 @@ def test_pictures_are_made_of_the_first_frame_at_or_after_the_moment(tmp_path: P
 @pytest.mark.parametrize("lane", [None, LANE])
 def test_pictures_show_the_lane_where_it_is_looked_for(tmp_path: Path, lane: Lane | None) -> None:
     names = stages(tmp_path, Fraction(0), detected(found=replace(road_seen(LENS), lane=lane)))
-    assert names == [*NAMES, "6-road.png", "7-above.png", "8-mask.png", "9-fit.png"]
+    lanes = "07-road.png", "08-above.png", "09-mask.png", "10-fit.png"
+    assert names == [*(f"0{name}" for name in NAMES), *lanes]
 
 
 def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path: Path) -> None:
-    assert stages(tmp_path, Fraction(0), result_of(CAR)) == ["1-boxes.png"]
+    assert stages(tmp_path, Fraction(0), result_of(CAR)) == ["1-boxes.png", "2-tracks.png"]
     lane = result_of(CAR, found=road_seen(None))
-    names = ["1-boxes.png", "2-road.png", "3-above.png", "4-mask.png", "5-fit.png"]
+    names = [f"{n}-{name}.png" for n, name in enumerate(LANES, start=1)]
     assert stages(tmp_path / "lanes", Fraction(0), lane) == names
+
+
+def test_tracks_are_drawn_with_their_states_and_those_that_were_lost(tmp_path: Path) -> None:
+    seen, lost = result_of(CAR, OTHER), result_of(CAR, time=Fraction(1))
+    picture = tmp_path / stages(tmp_path, Fraction(1), seen, lost)[-1]
+    drawn = read_image(picture).astype(int)
+    edges = [Box(box.x1 + 4, box.y2 - 1, box.x2 - 4, box.y2).cut(drawn)[0] for box in (CAR, OTHER)]
+    assert np.ptp(edges[0].max(axis=0)) > 50, "a colour of its own"
+    assert edges[1].max(axis=0).tolist() == [160, 160, 160], "grey, dashed"
+    assert len({tuple(pixel) for pixel in edges[1].tolist()}) > 1
 
 
 def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> None:

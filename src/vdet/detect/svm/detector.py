@@ -37,13 +37,21 @@ from vdet.boxes import (
     from_xywh,
     iou_matrix,
 )
-from vdet.config.kinds import HeatSettings
+from vdet.config.kinds import FeatureSettings, HeatSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT
-from vdet.detect.svm.model import LinearModel, load_model
+from vdet.detect.svm.model import (
+    LinearModel,
+    cut_window,
+    histogram,
+    hog_descriptors,
+    load_model,
+    resize,
+    split,
+)
 from vdet.detect.svm.search import DenseSearch, FramePyramid, vehicle_boxes
 from vdet.detect.svm.windows import DEFAULT_HORIZON, Windows, find_horizon, window_grids
-from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
+from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, draw_lines, fill
 from vdet.errors import FrameSizeError, ModelError
 from vdet.media import Picture
 
@@ -406,7 +414,11 @@ class SvmDetector:
         return self._shown_in_still(boxes) if is_still else boxes
 
     def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return images of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat, threshold."""
+        """Return images of a frame, BGR uint8, by their names.
+
+        They are the windows, the features of the best hit or else of the first window, the hits,
+        the heat, and where it is above the threshold.
+        """
         trace: SearchTrace = detections.trace
         found, heat = trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()
@@ -426,7 +438,15 @@ class SvmDetector:
         hot_parts = np.where(hot[..., np.newaxis], image, image // 3)
         cv2.drawContours(hot_parts, contours, -1, GREEN, 2)
         draw_label(hot_parts, f"heat above {threshold:g}", (0, 0), WHITE)
-        return {"windows": windows, "hits": hits, "heat": blended, "threshold": hot_parts}
+        shown = (
+            found.boxes[np.argsort(-found.probabilities)]
+            if len(found.boxes)
+            else self.grids[0].boxes
+        )
+        patch = resize(cut_window(image, *shown[0].tolist()), *[self._features.patch] * 2)
+        features = draw_features(patch, self._features)
+        pictures = {"windows": windows, "features": features, "hits": hits}
+        return pictures | {"heat": blended, "threshold": hot_parts}
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._settings.heat.threshold)
@@ -443,6 +463,9 @@ class SvmDetector:
         shown = boxes[large & (boxes.scores >= settings.min_score_still)]
         return shown[~are_nested(shown.sides, shown.data["strength"])]
 
+
+_DRAWN = 384
+"""Side of each part of the picture of features, pixels."""
 
 _MODELS = Path(__file__).parents[2] / "models"
 
@@ -474,6 +497,38 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
     requested = settings.features if "features" in settings.model_fields_set else None
     model = load_model(path or shipped_model(settings), requested)
     return SvmModel(model, settings)
+
+
+def draw_features(patch: Image, settings: FeatureSettings) -> Image:
+    """Return a patch, the HOG of its luma, and the histograms of its channels, side by side.
+
+    The strokes of a cell run along its edges, and are brighter where the edge is stronger.
+    """
+    hog, blocks, channels = settings.hog, settings.blocks, split(patch, settings)
+    descriptor = hog_descriptors(settings, settings.patch, settings.patch)[0]
+    shape = blocks, blocks, hog.block, hog.block, hog.orientations  # x comes before y
+    by_block = np.reshape(descriptor.compute(channels[0]), shape)
+    count = settings.patch // hog.cell
+    cells = np.full((count, count, hog.orientations), 1e-9)
+    for x, y in np.ndindex(hog.block, hog.block):
+        part = cells[x : x + blocks, y : y + blocks]
+        np.maximum(part, by_block[:, :, x, y], out=part)
+    strokes, bars = np.zeros((2, _DRAWN, _DRAWN, 3), np.uint8)
+    for x, y, number in zip(
+        *np.unravel_index(np.argsort(cells, axis=None), cells.shape), strict=True
+    ):
+        angle = np.pi * ((number + 0.5) / hog.orientations + 0.5)
+        reach = 0.45 * np.array((np.cos(angle), np.sin(angle)))
+        ends = (np.array((x, y)) + 0.5 + [-reach, reach]) * _DRAWN / count
+        draw_lines(strokes, ends, (255 * cells[x, y, number] / cells.max(),) * 3, 1)
+    for row, channel in enumerate(channels, start=1):
+        counts = histogram(channel, settings.histogram.bins)
+        tops = (row - 0.9 * counts / counts.max()) * _DRAWN / 3
+        sides = np.linspace(0, _DRAWN, len(counts) + 1)
+        for left, right, top in zip(sides, sides[1:], tops, strict=False):
+            fill(bars, Box(left, top, right, row * _DRAWN / 3), color_of(row))
+    enlarged = cv2.resize(patch, (_DRAWN, _DRAWN), interpolation=cv2.INTER_NEAREST)
+    return np.hstack([enlarged, strokes, bars])
 
 
 def blend_heat(image: Image, heat: Heat) -> Image:

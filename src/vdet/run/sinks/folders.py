@@ -11,7 +11,7 @@ from typing import Any
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
 from vdet.config.rendering import render_settings
-from vdet.draw.boxes import WHITE, draw_box, draw_label, draw_regions
+from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
@@ -25,6 +25,7 @@ from vdet.regions import Regions
 from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.track.track import Track
 from vdet.traffic.clock import Clock, Span, extend
 from vdet.traffic.live import LiveTraffic
 from vdet.traffic.records import Crop, VehicleRecord
@@ -32,6 +33,7 @@ from vdet.traffic.records import Crop, VehicleRecord
 log = logging.getLogger("vdet")
 
 _BOXES = "boxes"
+_GREY = 160, 160, 160
 _CROP_NAME = re.compile(r"vehicle-\d{4,}(-[\w-]+)?-at--?\d+\.\d{3}s\.jpg")
 _GAP = 1.0  # minimum seconds between two frames that the page calls a gap
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
@@ -41,6 +43,10 @@ class StagesSink(BaseSink):
     """Writes stage images of the first searched frame at or after the time `SinkContext.at`."""
 
     _is_done = False
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._tracks: dict[int, Track] = {}
 
     def finish(self) -> None:
         """Raise `OutputError` if there is no frame at this time."""
@@ -52,6 +58,7 @@ class StagesSink(BaseSink):
     def write(self, result: FrameResult) -> None:
         """Write the images if this is the frame."""
         if self._is_done or not result.searched or result.frame.time < self.context.at:
+            self._tracks.update((track.id, track) for track in result.tracks)
             return
         self._is_done = True
         pictures = self.context.stage_images(result.frame.image, result.detections)
@@ -60,11 +67,13 @@ class StagesSink(BaseSink):
             regions = Regions(self.context.settings.regions, width, height)
             pictures["regions"] = draw_regions(result.frame.image, regions)
         pictures[_BOXES] = _with_boxes(result)
+        if self.context.video and (result.tracks or self._tracks):
+            pictures["tracks"] = _with_states(result, self._tracks)
         if result.road:
             pictures |= stage_images(result.road, result.frame.image)
         folder = self.context.files.stage_folder(self.path)
         for number, (name, picture) in enumerate(pictures.items(), start=1):
-            path = folder / f"{number}-{name}.png"
+            path = folder / f"{number:0{len(str(len(pictures)))}}-{name}.png"  # in order
             path.write_bytes(encode_image(picture, path))
 
 
@@ -76,6 +85,18 @@ def _with_boxes(result: FrameResult) -> Image:
         draw_box(picture, detection.box, WHITE)
         draw_label(picture, f"{detection.score:.2f}", (detection.box.x1, detection.box.y2), WHITE)
     result.draw_tracks(picture, IMAGE_LABELS[-1])
+    return picture
+
+
+def _with_states(result: FrameResult, earlier: Mapping[int, Track]) -> Image:
+    """Draw the tracks with their states, and where earlier ones were lost, which are grey."""
+    picture, shown = result.frame.image.copy(), {track.id for track in result.tracks}
+    lost = [track for number, track in earlier.items() if number not in shown]
+    for track in lost:
+        draw_box(picture, track.box, _GREY, f"#{track.id} lost", dashed=True)
+    for track in result.tracks:
+        is_dashed, text = track.state == "predicted", f"#{track.id} {track.state}"
+        draw_box(picture, track.box, color_of(track.id), text, dashed=is_dashed)
     return picture
 
 
