@@ -80,7 +80,7 @@ def test_all_three_run_through_detect_video(package: Path, clip: Path, tmp_path:
         assert (track["id"], track["score"], track["state"]) == (1, 0.9, "detected")
         assert abs(track["x"] - car_at(number).x1) <= 2
     names = sorted(path.name for path in (tmp_path / "stages").iterdir())
-    assert names == ["1-red.png", "2-boxes.png"]
+    assert names == ["1-red.png", "2-boxes.png", "3-tracks.png"]
 
 
 def test_the_detector_and_the_sink_run_through_detect_image(package: Path, tmp_path: Path) -> None:

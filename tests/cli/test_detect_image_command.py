@@ -55,7 +55,9 @@ def test_a_picture_of_every_stage(run: Run, picture: Path, model_path: Path) -> 
     ]
     assert sorted(p.name for p in stages.iterdir()) == names
     for name in names:
-        assert read_image(stages / name).shape == (180, 320, 3)
+        assert read_image(stages / name).shape == (
+            (384, 1152, 3) if "feat" in name else (180, 320, 3)
+        )
 
 
 def test_without_an_output_the_vehicles_are_printed(
