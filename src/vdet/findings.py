@@ -62,10 +62,10 @@ def without(findings: Iterable[Finding], codes: Collection[str]) -> tuple[Findin
 
 
 def with_counted(of_tracks: Iterable[Finding], of_counts: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings of tracks and of counts, which do not repeat that nothing was found."""
+    """Return the findings of tracks, and those of counts that do not repeat them."""
     first = tuple(of_tracks)
     said = {item.code for item in first} & {"nothing-found"}
-    return first + without(of_counts, said)
+    return first + tuple(item for item in without(of_counts, said) if item not in first)
 
 
 def at_places(findings: Iterable[Finding]) -> tuple[Finding, ...]:

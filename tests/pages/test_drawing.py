@@ -18,10 +18,12 @@ from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, counts, frames, settings_f
 from vdet.boxes import Box
 from vdet.config.loading import given_values, load_settings, parse_document
 from vdet.config.schema import Settings
+from vdet.findings import Finding
 from vdet.lanes.camera import Undistorter
-from vdet.lanes.ground import fit_ground
+from vdet.lanes.ground import fit_ground, ground_of
 from vdet.pages.drawing import Drawing
 from vdet.track.track import FrameTracks, Track
+from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counting import count_frames
 from vdet.traffic.crossings import Border, crossings, lines_and_zones
 
@@ -197,12 +199,20 @@ def test_zones_regions_and_points_are_drawn_by_keys_and_undone(
     assert "zones" not in window.text("#text")
 
 
-@pytest.mark.parametrize("is_width", [False, True])
-def test_two_known_lengths_along_a_lane_or_its_width_are_enough_for_the_ground(
-    window: Browser, tmp_path: Path, is_width: bool
+@pytest.mark.parametrize(
+    ("fields", "focal"),
+    [
+        ({"length-1": "3", "length-3": "9"}, 1600.0),
+        ({"lane-width": "3.5", "length-1": "24"}, 1600.0),
+        ({"lane-width": "3.5"}, 1280.0),
+    ],
+    ids=["two lengths", "a width and a length", "a width and a usual lens"],
+)
+def test_known_lengths_along_a_lane_give_the_ground_and_its_width_alone_no_speeds(
+    window: Browser, tmp_path: Path, fields: dict[str, str], focal: float
 ) -> None:
     # A level camera 8 m above the road, tilted by 12 degrees; the lane runs 6 degrees to the right.
-    tilt, turn, focal = np.radians(12), np.radians(6), 1280.0 if is_width else 1600.0
+    tilt, turn, is_width = np.radians(12), np.radians(6), "lane-width" in fields
 
     def seen(along: float, across: float = 0) -> tuple[float, float]:
         x = 1.5 + along * np.sin(turn) + across * np.cos(turn)
@@ -221,13 +231,18 @@ def test_two_known_lengths_along_a_lane_or_its_width_are_enough_for_the_ground(
     )
     assert texts == ["1", "2", "3", "4"]
     assert "ground" not in window.text("#text")
-    for name, value in (
-        {"lane-width": "3.5"} if is_width else {"length-1": "3", "length-3": "9"}
-    ).items():
+    for name, value in fields.items():
         window.run("get(arguments[0]).focus()", name)
         window.type(value)
     window.type(ENTER)
-    values = parse_document(window.text("#text"), "text").values["camera"]["ground"]
+    camera = parse_document(window.text("#text"), "text").values["camera"]
+    values, is_guess = camera["ground"], len(fields) == 1 and is_width
+    assert ("no speeds" in window.text("#warnings")) == is_guess
+    (tmp_path / "gate.yaml").write_text(window.text("#text"))
+    settings = load_settings([tmp_path / "gate.yaml"])
+    assert (ground_of(settings.camera, 1280, 720) is None) == is_guess
+    (*_, finding) = VehicleCounter(settings, 1280, 720).counts().findings or (Finding("", ""),)
+    assert ("camera.ground: no speeds: " in finding.text) == is_guess
     ground = fit_ground(
         np.array([value["pixel"] for value in values]) + 0.5,
         np.array([value["metres"] for value in values]),
@@ -253,8 +268,8 @@ def test_metres_by_which_cars_are_far_too_wide_have_a_warning(
         window.click((300, 700), (500, 300), (1000, 700), (800, 300))
         window.run("get('lane-width').focus()")
         window.type(str(width), ENTER)
-        warning = window.text("#warnings")
-        assert bool(warning) == (width == 100)
+        warning = window.run("return get('warnings').lastChild.textContent")
+        assert ("cars are" in warning) == (width == 100)
     assert warning == "ground: cars are 19.7 m wide by these points; check their metres"
 
 

@@ -93,6 +93,8 @@ class Conditions:
         settings, findings = self._settings, []
         if settings.lack_of_metres:
             findings.append(Finding("lane-geometry", settings.lack_of_metres, severity="note"))
+        if settings.camera.lack_of_speeds:
+            findings.append(Finding("ground", settings.camera.lack_of_speeds))
         if self._lanes < _FEW * self._frames:
             text = f"the lane was found in {self._lanes} of {self._frames} frames"
             findings.append(Finding("lane", f"{text}: check lanes.points in --stages"))

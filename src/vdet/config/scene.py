@@ -332,6 +332,8 @@ class GroundPoint(Shape):
     """Position in the frame, x and y; whole numbers are the centres of pixels."""
     metres: tuple[_Metres, _Metres]
     """Position on the road, x and y in metres at right angles, from any origin."""
+    by: Literal["lane"] | None = None
+    """lane: from the width of a lane alone, so lengths along it are a guess. null: measured."""
 
 
 _TWO_DIGITS = r"(?:\d\d|(?<!\d)\d(?!\d))"
@@ -447,3 +449,10 @@ class CameraSettings(Section):
     speeds and distances are measured.
     """
     clock: ClockSettings = ClockSettings()
+
+    @property
+    def lack_of_speeds(self) -> str | None:
+        """Why ground points give no speeds; None if they do, or if there are none."""
+        why = "the width of a lane alone does not give lengths along it"
+        advice = f"camera.ground: no speeds: {why}; also give a length along it in vdet draw"
+        return advice if any(point.by for point in self.ground) else None

@@ -70,14 +70,16 @@ class Ground:
 
 
 def ground_of(camera: CameraSettings, width: int, height: int) -> Ground | None:
-    """Fit the road plane of a camera for frames of `width` × `height` pixels; None without points.
+    """Fit the road plane of a camera for frames of `width` × `height` pixels.
+
+    None without points, and where these do not give lengths along the road.
 
     Raises
     ------
     ConfigError
         The points do not fix a plane or do not fit together, or the lens is for other frames.
     """
-    if not camera.ground:
+    if not camera.ground or camera.lack_of_speeds:
         return None
     points = [point.for_frames(width, height) for point in camera.ground]
     pixels = np.array([point.pixel for point in points], np.float64)

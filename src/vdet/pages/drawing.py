@@ -84,10 +84,12 @@ class Drawing:
 
     def _page(self, name: str) -> str:
         shapes, other_settings = split(self._values, self._size)
+        lens = self._settings.camera.lens
         times = [frame.time for frame in self._frames]
         data = {
             "name": name,
             "size": self._size,
+            "focal": lens and lens.matrix_for(*self._size)[0][0],
             "span": (times[0], times[-1]) if times else (0, 0),
             "picture": jpeg_uri(self._image),
             "paths": pack_paths(self.paths),

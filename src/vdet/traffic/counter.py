@@ -123,6 +123,8 @@ class VehicleCounter:
         events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
         directions = tuple((item.name, way) for item in self.borders for way in item.directions)
         findings = list(_line_findings(self.lines, passages))
+        if lack := self._settings.camera.lack_of_speeds:
+            findings.append(Finding("ground", lack))
         if 2 * self._long_steps > self._steps:
             text = "fewer than 5 frames per second: vehicles are missed; record more"
             findings.insert(0, Finding("frame-rate", text))

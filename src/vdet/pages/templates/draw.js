@@ -238,6 +238,8 @@ function warningsOf(line, visits, paths, span) {
   ].filter(text => text);
 }
 
+const LANE_ONLY = "ground: no speeds: the width of a lane alone does not give lengths along it; also give the metres of points 1 to 2";
+
 /** Return a warning if cars cannot have the widths that the ground gives them: their boxes are 1.25 times as wide as high. */
 function groundWarnings(ground, paths) {
   const widths = paths.filter(path => path.kind === "car").flatMap(path => {
@@ -318,10 +320,13 @@ function fitGround(points) {
   return toMetres && toPixels ? { toMetres, toPixels } : null;
 }
 
-/** Return the plane below a level camera whose focal length is the frame's width, in any unit: where a pixel lies, and how
- * far aside a straight line goes for each unit along, by the x of its vanishing point. */
-function levelPlane(horizon, size) {
-  const middle = size[0] / 2, focal = Math.hypot(size[0], horizon - size[1] / 2);
+/** Return the distance of the horizon from a camera, pixels; without a focal length, that is assumed to be the width. */
+const toHorizon = (horizon, size, focal) => Math.hypot(focal ?? size[0], horizon - size[1] / 2);
+
+/** Return the plane below a level camera in any unit: where a pixel lies, and how far aside a straight line goes for each
+ * unit along, by the x of its vanishing point. `focal` is the distance of the horizon. */
+function levelPlane(horizon, size, focal) {
+  const middle = size[0] / 2;
   return {
     place: ([x, y]) => [(x - middle) / focal, 1].map(value => value / (y - horizon)),
     slopeOf: vanishing => (vanishing - middle) / focal,
@@ -329,18 +334,24 @@ function levelPlane(horizon, size) {
 }
 
 /** Return points of the plane in metres: `scale` is the number of metres of a unit. */
-const scaledGround = (pixels, place, scale) => pixels.map(pixel => ({ pixel, metres: place(pixel).map(value => value * scale) }));
+const scaledGround = (pixels, place, scale, by) =>
+  pixels.map(pixel => ({ pixel, metres: place(pixel).map(value => value * scale), by }));
 
 /** Return points of the plane from the width of a straight lane: two points on its left line, and two on its right, near
- * and far; null where they do not fit. */
-function groundOfLane(pixels, laneWidth, size) {
+ * and far; null where they do not fit. Lengths along the lane follow from the focal length, in pixels, or from the metres
+ * between the first two points, which give it; without both, they are a guess, and the points say so. */
+function groundOfLane(pixels, laneWidth, size, focal, length) {
   const [[x1, y1], [x2, y2], [x3, y3], [x4, y4]] = pixels, a = x1 * y2 - y1 * x2, b = x3 * y4 - y3 * x4;
   const parallel = (x1 - x2) * (y3 - y4) - (y1 - y2) * (x3 - x4);
   const [vanishing, horizon] = [a * (x3 - x4) - (x1 - x2) * b, a * (y3 - y4) - (y1 - y2) * b].map(value => value / parallel);
   if (!(laneWidth > 0 && y1 > y2 && y3 > y4 && horizon < Math.min(y2, y4))) return null;
-  const { place, slopeOf } = levelPlane(horizon, size), slope = slopeOf(vanishing);
+  const aside = vanishing - size[0] / 2, widths = [pixels[0], pixels[2]].map(([x, y]) => (x - vanishing) / (y - horizon));
+  const ratio = length * Math.abs(widths[1] - widths[0]) / laneWidth / (1 / (y2 - horizon) - 1 / (y1 - horizon));
+  const distance = length ? (ratio + Math.sqrt(ratio ** 2 - 4 * aside ** 2)) / 2 : toHorizon(horizon, size, focal);
+  if (!distance) return null;
+  const { place, slopeOf } = levelPlane(horizon, size, distance), slope = slopeOf(vanishing);
   const [left, right] = [pixels[0], pixels[2]].map(place).map(([across, along]) => across - slope * along);
-  return scaledGround(pixels, place, laneWidth * Math.hypot(1, slope) / Math.abs(right - left));
+  return scaledGround(pixels, place, laneWidth * Math.hypot(1, slope) / Math.abs(right - left), focal || length ? undefined : "lane");
 }
 
 /** Return points of the plane from two lengths along a straight lane, each from near to far; null where they do not
@@ -351,7 +362,7 @@ function levelGround(pixels, lengths, size) {
   const [a, b, c] = [1 - ratio, ratio * (y1 + y2) - y3 - y4, y3 * y4 - ratio * y1 * y2];
   const horizon = (-b - Math.sqrt(b * b - 4 * a * c)) / (2 * a);
   if (!(y1 > y2 && y2 >= y3 && y3 > y4 && ratio > 0 && horizon < y4)) return null;
-  const [near, , , far] = pixels, { place, slopeOf } = levelPlane(horizon, size);
+  const [near, , , far] = pixels, { place, slopeOf } = levelPlane(horizon, size, toHorizon(horizon, size));
   const slope = slopeOf(near[0] + (far[0] - near[0]) * (horizon - near[1]) / (far[1] - near[1]));
   const scale = lengths[0] / Math.hypot(1, slope) / (1 / (y2 - horizon) - 1 / (y1 - horizon));
   const aside = (near[0] < size[0] / 2 ? size[0] : -size[0]) / 4 / (y1 - horizon);
@@ -362,7 +373,7 @@ function levelGround(pixels, lengths, size) {
 // ---------------------------------------------------------------- the file
 const MARK = "# Drawn with vdet draw";
 const FORMS = { // the lists of the file, and what their items have
-  ground: ["pixel", "metres"], regions: ["name", "kind", "points", "mask"],
+  ground: ["pixel", "metres", "by"], regions: ["name", "kind", "points", "mask"],
   lines: ["name", "start", "end", "left", "right", "approach", "flows"], zones: ["name", "points", "flows"],
 };
 
@@ -690,7 +701,7 @@ async function openPage(data) {
         way === sides.left ? { left: "in", right: "out" } : { left: "out", right: "in" })),
       choice("Approach", "field-approach", each.approach, data.approaches, arm => { each.approach = arm || undefined; }));
     const metres = (each.metres ?? []).map((value, i) => field(`Metres ${i ? "along" : "across"}`, `metres-${i}`, value,
-      text => { each.metres[i] = Number(text) || 0; }, "number"));
+      text => { each.metres[i] = Number(text) || 0; delete each.by; }, "number"));
     box.replaceChildren(el("h3", {}, `Selected ${KINDS[selected.kind]}`), ...names, ...metres,
       each.start ? button("Swap sides (S)", swap, "swap") : "", button("Delete (Del)", remove, "delete"));
   }
@@ -702,13 +713,13 @@ async function openPage(data) {
     const set = event => {
       event.preventDefault();
       const pixels = drawn.map(point => point.map(value => value - 0.5)), lengths = inputs.map(input => Number(input.value));
-      const made = laneWidth.value ? groundOfLane(pixels, Number(laneWidth.value), size) : levelGround(pixels, lengths, size);
+      const made = laneWidth.value ? groundOfLane(pixels, Number(laneWidth.value), size, data.focal, lengths[0]) : levelGround(pixels, lengths, size);
       if (made) change(() => { places.ground = made; setTool("select"); });
       else say("These lengths do not fit the points: points 1 and 2, then 3 and 4, must go from near to far.");
     };
     return el("form", { onsubmit: set }, el("p", {}, "Ends of two known lengths along one straight lane, from near to far. The camera is assumed to be level."),
       ...inputs.map((input, i) => el("label", {}, `Points ${2 * i + 1} to ${2 * i + 2}, m`, input)),
-      el("p", {}, "Or the width of a lane: points 1 and 2 on its left line, 3 and 4 on its right line, from near to far."),
+      el("p", {}, "Or the width of a lane: points 1 and 2 on its left line, 3 and 4 on its right line, from near to far. Speeds also need the metres of points 1 to 2, such as a dash and its gap, unless the lens is known."),
       el("label", {}, "Width of the lane, m", laneWidth), el("button", {}, "Set the metres (Enter)"));
   }
 
@@ -732,6 +743,7 @@ async function openPage(data) {
     const lines = found.slice(0, places.lines.length), problems = problemsOf(places, size);
     const warnings = lines.flatMap(({ border, visits }) =>
       warningsOf(border, visits, paths, data.span).map(text => `${border.name}: ${text}`));
+    if (places.ground.some(point => point.by)) warnings.push(LANE_ONLY);
     warnings.push(...groundWarnings(fitGround(places.ground), paths));
     get("warnings").replaceChildren(...[...problems, ...warnings].map((text, i) =>
       el("li", { class: i < problems.length ? "problem" : "" }, text)));
