@@ -13,11 +13,13 @@ PAGE = Path(__file__).with_name("commands.md")
 _INTRODUCTION = """# Commands
 
 The help of every command, written by `make commands`. All commands also have `-q`, `-v` and `-h`,
-and all but `calibrate`, `demo` and `eval counts` have `-c` and `--set`: see `vdet config`.
+and all but `calibrate`, `demo` and `eval counts` have `-c` and `--set`: see `vdet config`. Those
+that write files have `--overwrite`, which replaces existing outputs, and those that find vehicles
+have `--model FILE` (`detector.model`), a .npz or .onnx, which determines the detector.
 """
 
 _WITH_ALL_OPTIONS = ("vdet", "vdet config")
-_COMMON_OPTION = re.compile(r"^  (?:-[qvhc], --\w+|--set ).*\n(?: {4,}.*\n)*", re.MULTILINE)
+_COMMON_OPTION = re.compile(r"^  (?:-[qvhc], --\w+|--set |--overwrite |--model ).*\n(?: {4,}.*\n)*", re.MULTILINE)
 _EMPTY_SECTION = re.compile(r"^\w[\w ]*:\n(?:\n|\Z)", re.MULTILINE)
 
 

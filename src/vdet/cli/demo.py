@@ -17,13 +17,12 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     """Try the whole program on synthetic roads.
 
     Draws two roads with vehicles, from a moving camera and from a pole. The network finds the
-    vehicles, and counts those seen from the pole. Then a linear model is trained on patches of
-    other synthetic roads and finds the vehicles too. All results are compared with the ground
-    truth. All files are written into DIR, by default demo.
+    vehicles, and counts those seen from the pole. Then a linear model, trained on patches of other
+    synthetic roads, finds them too. All results are compared with the ground truth, and written
+    into DIR, by default demo.
 
     \b
     Examples:
-      vdet demo
       vdet demo folder --seed 2 --overwrite
     """
     from vdet.demo import run_demo

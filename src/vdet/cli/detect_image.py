@@ -54,10 +54,8 @@ def detect_image(
 
     \b
     Examples:
-      vdet detect-image road.jpg
       vdet detect-image road.jpg -o found.jpg --json -
-      vdet detect-image images/ -o found/ --json boxes.json
-      vdet detect-image images/ --labels images.coco.json
+      vdet detect-image images/ -o found/ --labels images.coco.json
       vdet detect-image road.jpg --stages stages
     """
     settings = source.load()

@@ -18,7 +18,7 @@ from vdet.files import OutputFiles, output_errors
     "-o",
     "--output",
     required=True,
-    help="Page to write, .html; scene for a survey, .jpg or .png; or .svg with counts.",
+    help="Page to write, .html, or scene for a survey, .jpg or .png, or .svg with counts.",
 )
 @options.tracks_from_option()
 @options.start_option

@@ -72,15 +72,13 @@ jobs_option = partial(number_option, "--jobs", type=PROCESSES, show_default="one
 
 counts_option = output_files(
     "--counts",
-    help="Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and "
-    ".zones.csv have tables by interval, .json has everything, .xlsx is a workbook of the survey. "
-    "Can be repeated.",
+    help="Write counts at lines and zones: events (.csv), tables by interval (.totals.csv, "
+    ".wide.csv, .zones.csv), everything (.json), or a workbook (.xlsx). Can be repeated.",
 )
 flows_option = output_files(
     "--flows",
-    help="Write flows from one line or zone to another: .csv has a row for each interval, flow and "
-    "class, .wide.csv has a row for each interval, with sums, .json has "
-    "the flows and the matrix, .xlsx is as for --counts. Can be repeated.",
+    help="Write flows from one line or zone to another: .csv, .wide.csv (a row for each interval), "
+    ".json (with the matrix), or the workbook (.xlsx). Can be repeated.",
 )
 interval_option = click.option(
     "--interval",
@@ -141,8 +139,7 @@ lanes_option = click.option(
 )
 model_option = input_file(
     "--model",
-    help="Detector model: .npz from vdet train, or .onnx. It determines which detector runs "
-    "(`detector.model`).",
+    help="Detector model: .npz or .onnx. It determines the detector (`detector.model`).",
 )
 _configs_option = click.option(
     "-c",
@@ -349,8 +346,7 @@ def facts_options(command: Function) -> Function:
         "--json",
         "json_target",
         metavar="FILE",
-        help="Write the results to FILE. With -, to standard output, and the text to standard "
-        "error.",
+        help="Write the results to FILE, or with - to standard output.",
     )
     @overwrite_option
     @wraps(command)

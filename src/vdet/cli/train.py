@@ -32,9 +32,8 @@ def train(
     """Train a linear model on labelled patches.
 
     Each DATA is a folder or a zip file with images in vehicles/<group>/ and non-vehicles/<group>/.
-    A file boxes.csv beside these folders, such as vdet mine writes, has the box of the vehicle in
-    each patch; with it the model also learns to find the sides of vehicles. The metrics are
-    printed and stored in the model; vdet info --json reads them.
+    With the boxes.csv of vdet mine beside these folders, the model also learns to find the sides of
+    vehicles.
 
     \b
     Examples:
@@ -79,13 +78,11 @@ def mine(
 ) -> None:
     """Cut patches for vdet train out of labelled videos.
 
-    Writes the labelled vehicles with their boxes, and false alarms: windows that the model
-    classifies as vehicles although they contain none, or only a part of one. Ignore regions are
-    skipped.
+    Writes the labelled vehicles with their boxes, and false alarms of the model, also on parts of
+    vehicles. Ignore regions are skipped.
 
     \b
     Examples:
-      vdet mine in.mp4 --truth gt.txt -o mined.zip
       vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt -o mined.zip
     """
     if until is not None and until < first:
@@ -124,7 +121,7 @@ def mine(
 )
 @options.input_file(
     "--base",
-    help="Start from the weights of this network of vdet train-net; default is the shipped one.",
+    help="Start from the weights of a network of vdet train-net, or of the shipped one: default.",
 )
 @click.option(
     "--device",
@@ -132,8 +129,7 @@ def mine(
     metavar="NAME",
     default="auto",
     show_default=True,
-    help="Compute on auto, cpu or cuda. auto uses a GPU if torch finds one. A stopped training run "
-    "resumes on any of them.",
+    help="Compute on auto (a GPU if torch finds one), cpu or cuda.",
 )
 @options.settings_options()
 @options.overwrite_option
