@@ -19,7 +19,9 @@ have `--model FILE` (`detector.model`), a .npz or .onnx, which determines the de
 """
 
 _WITH_ALL_OPTIONS = ("vdet", "vdet config")
-_COMMON_OPTION = re.compile(r"^  (?:-[qvhc], --\w+|--set |--overwrite |--model ).*\n(?: {4,}.*\n)*", re.MULTILINE)
+_COMMON_OPTION = re.compile(
+    r"^  (?:-[qvhc], --\w+|--(?:set|overwrite|model) ).*\n(?: {4,}.*\n)*", re.MULTILINE
+)
 _EMPTY_SECTION = re.compile(r"^\w[\w ]*:\n(?:\n|\Z)", re.MULTILINE)
 
 
