@@ -57,19 +57,21 @@ def test_a_vehicle_of_any_class_is_in_every_output(
 
 
 @pytest.mark.parametrize(
-    ("name", "size", "is_shown"),
+    ("name", "x", "size", "is_shown"),
     [
-        ("car", (16, 28), True),  # 0.45 is enough for a car, but not for a truck
-        ("truck", (16, 16), False),
-        ("motorcycle", (14, 30), True),
-        ("car", (14, 30), False),  # more than 1.8 times as high as wide: a sign
+        ("car", 64, (16, 28), True),  # 0.45 is enough for a car, but not for a truck
+        ("truck", 64, (16, 16), False),
+        ("motorcycle", 64, (14, 30), True),
+        ("car", 64, (14, 30), False),  # more than 1.8 times as high as wide: a sign
+        ("car", 7, (14, 30), True),  # a part of a car, as the left side of the image cuts it
+        ("car", 4, (8, 44), False),  # not even a part: a tree
     ],
 )
 def test_the_minimum_score_of_an_image_and_the_maximum_height_depend_on_the_class(
-    tmp_path: Path, name: str, size: tuple[int, int], is_shown: bool
+    tmp_path: Path, name: str, x: int, size: tuple[int, int], is_shown: bool
 ) -> None:
     names = NetworkSettings().classes
-    form = ultralytics((128, 64), RedBox(64, 32, *size, names.index(name)), len(names))
+    form = ultralytics((128, 64), RedBox(x, 32, *size, names.index(name)), len(names))
     metadata = {"task": "detect", "names": str(dict(enumerate(names))), "imgsz": "[64, 128]"}
     network = write_network(tmp_path / "net.onnx", form, (128, 64), (64, 32), metadata=metadata)
     image = np.zeros((64, 128, 3), np.uint8)

@@ -46,8 +46,10 @@ Candidates = tuple[Sequence[Boxes], bool]
 
 
 _FOUR_WHEELED = "car", "truck", "bus", "vehicle"
-_MAX_HEIGHT = 1.8
-"""Maximum height of a vehicle with four wheels, in widths; what is higher is a sign or a post."""
+_MAX_HEIGHT, _MAX_CUT_HEIGHT = 1.8, 5.0
+"""Maximum height of a vehicle with four wheels, in widths, and of the part of one that the left or
+right side of the frame cuts; what is higher is a sign, a post or a tree.
+"""
 
 _USUAL = NetworkSettings().classes
 
@@ -193,8 +195,8 @@ def _are_too_high(sides: Float64Array, size: tuple[int, int]) -> BoolArray:
     A picture of this `size` may cut off a part of a vehicle on the left or right.
     """
     cut = cut_sides(sides.T, size)
-    too_high = sides[:, 3] - sides[:, 1] > _MAX_HEIGHT * (sides[:, 2] - sides[:, 0])
-    return np.asarray(too_high & ~(cut.left | cut.right))
+    highest = np.where(cut.left | cut.right, _MAX_CUT_HEIGHT, _MAX_HEIGHT)
+    return np.asarray(sides[:, 3] - sides[:, 1] > highest * (sides[:, 2] - sides[:, 0]))
 
 
 def _mirrored(boxes: Boxes, width: int) -> Boxes:
