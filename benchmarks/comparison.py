@@ -20,7 +20,7 @@ from vdet.config.kinds import NetworkSettings
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.evaluate.scores import Scores, score
-from vdet.labels.label import Label, SavedTracks
+from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_truth
 from vdet.run.result import FrameResult
 from vdet.synthetic.render import write_clip, write_truth
@@ -98,11 +98,11 @@ def crossings_of(tracks: Sequence[Any], scene: Scene, **options: Any) -> int:
 
 def _labels(frames: Sequence[vdet.Boxes]) -> SavedTracks:
     return SavedTracks(
-        tuple(
-            Label(Track(box.id or 0, box.box, box.score, "detected"), frame=number)
+        {
+            number: [Track(box.id or 0, box.box, box.score, "detected") for box in boxes]
             for number, boxes in enumerate(frames)
-            for box in boxes
-        )
+            if len(boxes)
+        }
     )
 
 

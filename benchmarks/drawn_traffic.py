@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import Box
 from vdet.config.schema import LaneSettings, Settings
 from vdet.detect.detectors import DetectorModel
-from vdet.labels.label import Label, SavedTracks
+from vdet.labels.label import SavedTracks
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.frame import Coding
 from vdet.run.loop import Parts, build, peek
@@ -95,33 +94,20 @@ def follow(
 
 def shown_labels(results: Iterable[FrameResult]) -> SavedTracks:
     """Return the boxes that are shown."""
-    return SavedTracks(
-        tuple(
-            _label(result.frame.index, track.id, track.box)
-            for result in results
-            for track in result.tracks
-        )
-    )
+    return SavedTracks({result.frame.index: result.tracks for result in results if result.tracks})
 
 
 def true_labels(scene: Scene, indices: Iterable[int]) -> SavedTracks:
     """Return the true boxes of frames; vehicles that do not count are ignore regions."""
-    return SavedTracks(
-        tuple(
-            _label(
-                index,
-                true_box.id,
-                true_box.box,
-                ignored=not must_be_found(true_box, scene.camera.height),
-            )
-            for index in indices
-            for true_box in true_boxes(scene, index)
-        )
-    )
-
-
-def _label(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
-    return Label(Track(number, box, 1.0, "detected"), frame=index, ignored=ignored)
+    height = scene.camera.height
+    frames = {
+        index: [
+            Track(item.id, item.box, 1.0, "detected", ignored=not must_be_found(item, height))
+            for item in true_boxes(scene, index)
+        ]
+        for index in indices
+    }
+    return SavedTracks({index: tracks for index, tracks in frames.items() if tracks})
 
 
 @dataclass(frozen=True, slots=True)

@@ -160,11 +160,11 @@ def _both(
     """Yield the picture as it is and changed, if it has vehicles."""
     image = labelled.read()
     truth = [
-        label.track.box
+        label.box
         for label in labelled.labels
-        if label.track.class_name in _VEHICLES
+        if label.class_name in _VEHICLES
         and not label.ignored
-        and label.track.box.width >= _SMALLEST * image.shape[1]
+        and label.box.width >= _SMALLEST * image.shape[1]
     ]
     if not truth:
         return

@@ -38,7 +38,7 @@ from vdet.evaluate.results import score_files
 from vdet.evaluate.scores import Scores
 from vdet.files import OutputFiles, valid_text
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks, SourceVideo
+from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
@@ -60,7 +60,7 @@ from vdet.traffic.records import VehicleRecord
 
 __all__ = (
     "BaseSink", "BatchTotal", "Box", "Boxes", "Counts", "Detector", "DetectorKind",
-    "DetectorSettings", "Format", "FrameResult", "FrameTracks", "Label", "Results", "Run",
+    "DetectorSettings", "Format", "FrameResult", "FrameTracks", "Results", "Run",
     "RunTotals", "SavedTracks", "Scores", "Settings", "SinkKind", "Track", "Tracker",
     "TrackerKind", "TrackerSettings", "VdetError", "VehicleRecord", "count", "detect_image",
     "detect_video", "evaluate_tracks", "follow", "load_settings", "vehicles",

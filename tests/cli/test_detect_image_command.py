@@ -128,6 +128,6 @@ def test_labels_of_a_folder_and_those_below_are_read_by_eval_images(
     run("detect-image", folder, *options, code=0)
     found = read_labelled_images(labels).images
     assert [item.path for item in found] == [folder / "a.png", folder / "north" / "a.png"]
-    first, second = ([label.track.box for label in item.labels] for item in found)
+    first, second = ([label.box for label in item.labels] for item in found)
     assert first
     assert first == second

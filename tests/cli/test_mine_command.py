@@ -86,7 +86,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
     run("mine", clip_path, "--truth", truth_path, "-o", target, *options, code=0)
     with VideoReader(clip_path) as reader:
         frames = [frame.image for frame in reader]
-    labels = read_truth(truth_path).by_frame()
+    labels = read_truth(truth_path).frames
     seen = set()
     files = find_patches([target])
     for file, image in zip(files, read_patches(files), strict=True):

@@ -12,7 +12,7 @@ from red_cars import NullDetector
 from vdet.boxes import Box, Boxes, Image
 from vdet.conditions.cuts import with_cuts
 from vdet.findings import Finding
-from vdet.labels.label import Label, SavedTracks, SourceVideo
+from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.media import Frame, Picture
 from vdet.run.loop import Pipeline
 from vdet.track.factory import ShotTracker, timed
@@ -76,7 +76,7 @@ def test_tracks_end_at_a_cut_live_and_in_saved_tracks() -> None:
     live = [result.frame_tracks for result in results]
     finding = Finding("cut", "cut", ((place / 25, place / 25),))
     saved = SavedTracks(
-        tuple(Label(frame.tracks[0], frame=frame.index) for frame in live),
+        {frame.index: frame.tracks for frame in live},
         times={frame.index: frame.time for frame in live},
         video=SourceVideo("a.mp4", *SIZE, findings=(finding,)),
     )

@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 
 from evaluate.scenes import TEN, drive, video
+from labels.saving import Row
 from vdet.boxes import Box, Boxes
 from vdet.evaluate.results import Counting, MeasuredImage
 from vdet.evaluate.scores import ClassResult, class_results, compare
 from vdet.labels.images import LabelledImage
-from vdet.labels.label import Label
 from vdet.track.track import Track
 
 
 def test_vehicles_of_a_picture_are_counted_by_their_class_and_that_of_their_detection() -> None:
     places, true = [(x, 0, x + 100, 100) for x in range(0, 800, 200)], ["car", "truck", "truck"]
     labels = [
-        Label(Track(0, Box(*box), 1.0, "detected", name))
+        Track(0, Box(*box), 1.0, "detected", name)
         for box, name in zip(places, [*true, "vehicle"], strict=True)
     ]
     picture = LabelledImage(Path("a.png"), Path("a.txt"), tuple(labels))
@@ -30,8 +30,8 @@ def test_vehicles_of_a_picture_are_counted_by_their_class_and_that_of_their_dete
     )
 
 
-def named(name: str, *tracks: list[Label]) -> list[Label]:
-    return [label.named(name) for track in tracks for label in track]
+def named(name: str, *tracks: list[Row]) -> list[Row]:
+    return [(index, replace(track, class_name=name)) for rows in tracks for index, track in rows]
 
 
 def test_a_vehicle_of_a_video_has_the_last_class_of_the_track_that_finds_it_most() -> None:

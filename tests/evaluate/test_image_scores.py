@@ -17,7 +17,6 @@ from vdet.evaluate.results import (
     MeasuredSet,
 )
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.label import Label
 from vdet.track.track import Track
 
 PLAIN = Counting(score=0.5, min_width=0)
@@ -38,7 +37,7 @@ class Searched:
 
     def measured(self, counting: Counting) -> MeasuredImage:
         labels = (
-            Label(Track(0, box, 1.0, "detected", "car"), ignored=row in self.ignored)
+            Track(0, box, 1.0, "detected", "car", ignored=row in self.ignored)
             for row, box in enumerate(self.true)
         )
         picture = LabelledImage(Path("a.png"), Path("a.txt"), tuple(labels))

@@ -1,12 +1,12 @@
 """How results are shown: what stands in tables, values and pages, not how it looks."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
 
 from evaluate.scenes import TEN, drive, video
-from labels.saving import checked_video, row
+from labels.saving import Row, checked_video, row
 from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
 from vdet.boxes import Box, Boxes
@@ -29,7 +29,6 @@ from vdet.evaluate.results import (
     score_files,
 )
 from vdet.evaluate.scores import compare
-from vdet.labels.label import Label
 from vdet.labels.reading import read_labelled_images
 
 NAME = RunName("svm", None, None, ("b=1",))
@@ -38,8 +37,11 @@ NAME = RunName("svm", None, None, ("b=1",))
 class TestVideo:
     def clips(self, *found: range) -> list[ClipResult]:
         """Return as many clips; in each the vehicle is found in these of ten frames."""
-        truth = video([label.named("car") for label in drive(1, TEN)])
-        tracks = [[item.named("bus") for item in drive(1, frames)] for frames in found]
+        truth = video([(n, replace(track, class_name="car")) for n, track in drive(1, TEN)])
+        tracks = [
+            [(n, replace(track, class_name="bus")) for n, track in drive(1, frames)]
+            for frames in found
+        ]
         comparisons = [compare(video(track), truth) for track in tracks]
         return [ClipResult(f"clip {n}", one, 10) for n, one in enumerate(comparisons)]
 
@@ -73,7 +75,7 @@ class TestVideo:
 
 
 class TestMistakesInVideo:
-    def low(self, id_: int, frames: range, x: float = 0) -> list[Label]:
+    def low(self, id_: int, frames: range, x: float = 0) -> list[Row]:
         return [row(0, frame, id_, x, 60, 40, 40) for frame in frames]
 
     def test_one_is_shown_by_its_middle_frame_with_boxes(self, clip_path: Path) -> None:

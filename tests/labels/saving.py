@@ -8,16 +8,17 @@ from typing import Any
 from vdet.boxes import Box
 from vdet.labels.formats import Format, TrackWriter
 from vdet.labels.label import (
-    Label,
     SavedTracks,
     SourceVideo,
-    checked_labels,
+    check_frames,
 )
 from vdet.labels.reading import read_tracks
 from vdet.track.track import FrameTracks, Track
 
 VIDEO = SourceVideo("road & rail.mp4", 1280, 720)
 PLACE = Box.sized(10, 20, 30, 40)
+Row = tuple[int, Track]
+"""The number of a frame, and a track in it."""
 
 
 def row(
@@ -30,16 +31,25 @@ def row(
     height: float,
     score: float = 1.0,
     **known: Any,
-) -> Label:
-    """Return a label by the number of its frame, from 0, its id and its size."""
-    ignored, name = known.get("ignored", False), known.get("name")
-    track = Track(id_, Box.sized(x, y, width, height), score, "detected", name)
-    return Label(track, place, number, ignored)
+) -> Row:
+    """Return the number of a frame, from 0, and a track by its id and its size."""
+    box, name = Box.sized(x, y, width, height), known.pop("name", None)
+    return number, Track(id_, box, score, "detected", name, position=place, **known)
 
 
-def checked_video(rows: Iterable[Label], path: Path = Path("scene")) -> SavedTracks:
-    """Return checked labels as a video."""
-    return SavedTracks(checked_labels(path, rows))
+def video_of(rows: Iterable[Row], **known: Any) -> SavedTracks:
+    """Return rows as a video."""
+    frames: dict[int, list[Track]] = {}
+    for number, track in rows:
+        frames.setdefault(number, []).append(track)
+    return SavedTracks(frames, **known)
+
+
+def checked_video(rows: Iterable[Row], path: Path = Path("scene")) -> SavedTracks:
+    """Return rows as a video that was checked."""
+    video = video_of(rows)
+    check_frames(path, video.frames)
+    return video
 
 
 def frame(index: int, *tracks: Track) -> FrameTracks:

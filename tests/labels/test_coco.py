@@ -43,9 +43,11 @@ def test_tracks_that_cvat_exports_are_read() -> None:
     saved = read_coco(FILE, exported({0: [7], 5: [], 10: [7, 8]}))
     assert saved.covered == (0, 5, 10)
     assert saved.size == (300, 200)
-    assert [(row.frame, row.track.id, astuple(row.track.box)) for row in saved.labels] == [
-        *((0, 7, (1, 1, 9, 9)), (10, 7, (1, 1, 9, 9)), (10, 8, (1, 1, 9, 9)))
-    ]
+    assert {index: [row.id for row in rows] for index, rows in saved.frames.items()} == {
+        0: [7],
+        10: [7, 8],
+    }
+    assert {astuple(row.box) for row in saved.tracks} == {(1, 1, 9, 9)}
 
 
 def changed(name: str, number: int, **values: object) -> bytes:

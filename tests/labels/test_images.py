@@ -84,7 +84,7 @@ def test_what_is_written_is_read_back(
         written = np.array([astuple(Box.sized(*b.box)) for b in expected]).reshape(-1, 4)
         assert np.allclose(boxes_of(image.labels), written, atol=1e-6)
         assert [label.ignored for label in image.labels] == [b.name == "ignore" for b in expected]
-        vehicles = [label.track.class_name for label in image.labels if not label.ignored]
+        vehicles = [label.class_name for label in image.labels if not label.ignored]
         assert vehicles == [b.name for b in expected if b.name != "ignore"]
     shutil.rmtree(folder)
 
@@ -129,7 +129,7 @@ def test_a_label_that_occurs_twice_counts_once(
 ) -> None:
     write_coco(tmp_path, scene_of((1, 2, 20, 10), (1, 2, 20, 10), (1, 2, 20, 11)))
     (picture,) = read_labelled_images(tmp_path).images
-    assert [astuple(label.track.box) for label in picture.labels] == [
+    assert [astuple(label.box) for label in picture.labels] == [
         (1, 2, 21, 12),
         (1, 2, 21, 13),
     ]
@@ -286,14 +286,14 @@ class TestYolo:
         names = "".join(f"  {number}: {name}\n" for number, name in enumerate(NAMES))
         (tmp_path / "data.yaml").write_text(f"names:\n{names}", encoding="utf-8")
         image = read_labelled_images(tmp_path / "train").images[0]
-        assert [label.track.class_name for label in image.labels] == ["car", "truck", "vehicle"]
+        assert [label.class_name for label in image.labels] == ["car", "truck", "vehicle"]
 
     def test_a_polygon_is_taken_as_its_box(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
         path.write_text("0 0.5 0.5 0.1 0.1\n1 0.25 0.5 0.5 0.75 0.375 1\n", encoding="utf-8")
         image = read_labelled_images(tmp_path).images[0]
-        assert [label.track.class_name for label in image.labels] == ["car", "truck"]
-        assert astuple(image.labels[1].track.box) == (
+        assert [label.class_name for label in image.labels] == ["car", "truck"]
+        assert astuple(image.labels[1].box) == (
             0.25 * WIDTH,
             0.5 * HEIGHT,
             0.5 * WIDTH,
@@ -304,7 +304,7 @@ class TestYolo:
         path = write_yolo(tmp_path, SCENE)
         path.write_text("0 1.000001 0.5 0.125 1.01\n", encoding="utf-8")
         (label,) = read_labelled_images(tmp_path).images[0].labels
-        assert astuple(label.track.box) == (0.9375 * WIDTH, 0, 1.0625 * WIDTH, HEIGHT)
+        assert astuple(label.box) == (0.9375 * WIDTH, 0, 1.0625 * WIDTH, HEIGHT)
 
     @pytest.mark.parametrize(
         ("text", "words"),

@@ -12,7 +12,7 @@ from vdet.labels.reading import read_tracks, read_truth
 def test_truth_of_the_older_form_has_ten_columns_and_a_flag(tmp_path: Path) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("4, 7, 11.5, 21, 20, 10, 1, -1, -1, -1\n4,8,1,1,9,9,0,-1,-1,-1")
-    assert [label.ignored for label in read_truth(path).labels] == [False, True]
+    assert [label.ignored for label in read_truth(path).tracks] == [False, True]
 
 
 def test_truth_with_spaces_is_read_and_several_classes_are_named(
@@ -20,7 +20,7 @@ def test_truth_with_spaces_is_read_and_several_classes_are_named(
 ) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1 7 11 21 20 10 1 4 0 0\n1 8 1 1 9 9 1 1 0 0\n1 9 1 1 9 9 0 0 0 0\n")
-    boxes = [astuple(label.track.box) for label in read_truth(path).labels]
+    boxes = [astuple(label.box) for label in read_truth(path).tracks]
     assert boxes == [(10, 20, 30, 30), (0, 0, 9, 9), (0, 0, 9, 9)]
     text = "column 8 has the classes 1, 4, which are all read as vehicles"
     assert caplog.messages == [f"{path}: {text}; keep only the rows of vehicles"]
@@ -32,13 +32,11 @@ def test_truth_of_uavdt_has_vehicles_partly_outside_and_a_file_of_ignore_regions
     path, regions = tmp_path / "M01_gt_whole.txt", tmp_path / "M01_gt_ignore.txt"
     path.write_text("1,7,11,21,20,10,2,1,1\n1,8,1,1,9,9,3,1,3\n")
     regions.write_text("1,7,101,1,50,50,1,-1,-1\n")
-    found = [
-        (label.track.id, label.track.box.x1, label.ignored) for label in read_truth(path).labels
-    ]
+    found = [(label.id, label.box.x1, label.ignored) for label in read_truth(path).tracks]
     assert found == [(7, 10, False), (8, 0, False), (-1, 100, True)]
     assert caplog.messages == []
     path.write_text("1,7,11,21,20,10,0,-1,-1,-1\n")
-    assert all(label.ignored for label in read_truth(path).labels)
+    assert all(label.ignored for label in read_truth(path).tracks)
     text = "has no vehicle, only ignore regions; column 7 is 0 in all lines"
     assert caplog.messages == [f"{path}: {text}"]
 
@@ -50,7 +48,7 @@ def test_tracks_are_written_without_a_heading() -> None:
 def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1,7,1,1,20,10,0,3,1\n1,8,1,1,20,10,1,3,1\n")
-    assert [row.track.id for row in read_tracks(path).labels] == [8]
+    assert [row.id for row in read_tracks(path).tracks] == [8]
 
 
 @pytest.mark.parametrize(

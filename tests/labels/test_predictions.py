@@ -22,12 +22,12 @@ def read(folder: Path, suffix: str, content: str) -> SavedTracks:
 
 @pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])
 def test_an_empty_file_is_a_video_without_boxes(tmp_path: Path, suffix: str, content: str) -> None:
-    assert read(tmp_path, suffix, content).labels == ()
+    assert read(tmp_path, suffix, content).frames == {}
 
 
 def test_times_may_be_those_of_a_wall_clock(tmp_path: Path) -> None:
     rows = "".join(f"{n},{1.7e9 + n / 25:.6f},1,1,1,9,9,detected\n" for n in range(3))
-    assert len(read(tmp_path, "csv", HEADER + rows).labels) == 3
+    assert len(read(tmp_path, "csv", HEADER + rows).frames) == 3
 
 
 def record(**changes: object) -> str:

@@ -35,8 +35,8 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
 ) -> None:
     path = tmp_path / name
     path.write_bytes(written(form, [frame(2, car(5))]))
-    (row,) = read_tracks(path).labels
-    assert (row.frame, row.track.id) == (2, 5)
+    ((index, (row,)),) = read_tracks(path).frames.items()
+    assert (index, row.id) == (2, 5)
 
 
 @pytest.mark.parametrize(

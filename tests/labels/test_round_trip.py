@@ -18,7 +18,7 @@ from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images, write_coco_images
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.images import LabelledImage
-from vdet.labels.label import Label, SavedTracks
+from vdet.labels.label import SavedTracks
 from vdet.labels.lines import CSV, JSON_LINES, MOT
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image
@@ -146,7 +146,7 @@ def labelled(draw: st.DrawFn) -> list[LabelledImage]:
             Path(name),
             Path(),
             tuple(
-                Label(replace(car(number, box), class_name=draw(CLASSES)))
+                replace(car(number, box), class_name=draw(CLASSES))
                 for number, box in enumerate(draw(st.sets(boxes(), max_size=4)), start=1)
             ),
             (VIDEO.width, VIDEO.height),
@@ -171,8 +171,7 @@ def test_labels_of_pictures_are_read_again(pictures: list[LabelledImage]) -> Non
     def boxes_by_path(labelled: list[LabelledImage], base: Path) -> dict[Path, object]:
         return {
             base / image.path: sorted(
-                (label.track.box.pixels, label.track.class_name or UNKNOWN)
-                for label in image.labels
+                (label.box.pixels, label.class_name or UNKNOWN) for label in image.labels
             )
             for image in labelled
         }

@@ -50,11 +50,11 @@ def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> No
     kinds = (None, "bus", "person")
     tracks = [car(number, class_name=name) for number, name in enumerate(kinds, start=1)]
     path.write_bytes(written(form, [frame(2, *tracks)]))
-    labels = read_truth(path).labels
-    assert [(label.frame, label.track.id, label.track.score) for label in labels] == [
+    ((index, labels),) = read_truth(path).frames.items()
+    assert [(index, label.id, label.score) for label in labels] == [
         *((2, 1, 1), (2, 2, 1), (2, 3, 1))
     ]
-    assert {label.track.box for label in labels} == {Box(10, 20, 40, 60)}
+    assert {label.box for label in labels} == {Box(10, 20, 40, 60)}
     assert [label.ignored for label in labels] == [False, False, True]
 
 

@@ -142,7 +142,7 @@ def test_a_pattern_has_folders_halves_of_days_zones_and_short_numbers(
 
 def test_saved_tracks_of_another_name_keep_their_clock() -> None:
     settings = Settings(camera=CameraSettings(clock=ClockSettings(pattern="%Y/%m/%d/%H.%M")))
-    saved = SavedTracks((), begin=parse_date_time("2026-05-01 07:00+02:00"))
+    saved = SavedTracks({}, begin=parse_date_time("2026-05-01 07:00+02:00"))
     clock = find_clock(Path("05.33.jsonl"), settings, saved=saved)
     assert str(clock) == "2026-05-01 07:00:00+02:00 (from the file)"
 
@@ -294,7 +294,7 @@ class TestZone:
         live = clock_of("20261025_015000.mp4")
         assert live is not None
         for offset, later in (("+02:00", "2026-10-25 02:50:00+01:00"), ("-03:00", None)):
-            saved = SavedTracks((), begin=parse_date_time(f"2026-10-25 01:50:00{offset}"))
+            saved = SavedTracks({}, begin=parse_date_time(f"2026-10-25 01:50:00{offset}"))
             clock = find_clock(Path("a"), Settings(), saved=saved)
             assert clock is not None
             assert str(clock.at(7200)) == (later or "2026-10-25 03:50:00-03:00")
@@ -370,7 +370,7 @@ class TestZone:
         os.environ["TZ"] = "EST5EDT,M3.2.0,M11.1.0"
         time.tzset()
         texts = "2026-03-07 12:00-05:00", "2026-03-10 12:00-04:00"
-        saved = [SavedTracks((), begin=parse_date_time(text)) for text in texts]
+        saved = [SavedTracks({}, begin=parse_date_time(text)) for text in texts]
         clocks = [find_clock(Path("a"), Settings(), saved=tracks) for tracks in saved]
         periods = Intervals([(clock, [(0.0, 60.0)]) for clock in clocks], 86_400).periods
         assert [str(period.start) for period in periods] == [

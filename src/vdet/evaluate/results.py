@@ -28,7 +28,7 @@ from vdet.evaluate.scores import (
 )
 from vdet.findings import warnings_in
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.label import Label, SavedTracks
+from vdet.labels.label import SavedTracks
 from vdet.labels.reading import Roles, read_tracks, read_truth
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
@@ -80,18 +80,15 @@ class MeasuredImage:
         """Compare the detections with the labels of an image, `width` pixels wide."""
         minimum = counting.min_width * width
         truth = [
-            Label(
-                replace(label.track, id=number),
-                ignored=label.ignored or label.track.box.width < minimum,
-            )
+            replace(label, id=number, ignored=label.ignored or label.box.width < minimum)
             for number, label in enumerate(image.labels)
         ]
         is_labelled = [name not in image.unlabelled for name in boxes.class_names]
         boxes = boxes[np.flatnonzero(is_labelled)]
         boxes = boxes[np.argsort(-boxes.scores, kind="stable")[:_MAX_DETECTIONS]]
         detected = [
-            Label(
-                Track(number, found.box, found.score, "detected", found.class_name),
+            Track(
+                *(number, found.box, found.score, "detected", found.class_name),
                 ignored=found.box.width < minimum,
             )
             for number, found in enumerate(boxes)
@@ -319,25 +316,26 @@ def evaluate_video(
     """
     all_classes = settings.model_copy(update={"classes": ()})
     run = Run(video, settings=all_classes, frames=until or truth.length or None)
-    labels, frames = list[Label](), 0
+    shown, frames = dict[int, list[Track]](), 0
     truth = truth.until(until) if until else truth
     with Results(run, Parts(model), with_traffic=False) as results:
         advance, info = progress("", results.reader.expected), results.reader.info
         for result in results:
-            labels += [
-                Label(replace(track, box=track.box.rounded), frame=result.frame.index)
-                for track in result.tracks
-            ]
+            tracks = [replace(track, box=track.box.rounded) for track in result.tracks]
+            shown |= {result.frame.index: tracks} if tracks else {}
             frames += 1
             advance(1)
     truth.check_end(video, frames)
     truth = truth.until(frames)
     if settings.regions:
         regions = Regions(settings.regions, info.width, info.height)
-        true_labels = [
-            label if regions.contains(label.track.foot) else label._replace(ignored=True)
-            for label in truth.labels
-        ]
-        truth = replace(truth, labels=tuple(true_labels))
-    comparison = compare(SavedTracks(tuple(labels)), truth)
+        true_frames = {
+            index: [
+                replace(track, ignored=track.ignored or not regions.contains(track.foot))
+                for track in tracks
+            ]
+            for index, tracks in truth.frames.items()
+        }
+        truth = replace(truth, frames=true_frames)
+    comparison = compare(SavedTracks(shown), truth)
     return ClipResult(str(video), comparison, frames, video)

@@ -13,7 +13,7 @@ Higher Order Metric for Evaluating Multi-Object Tracking", 2020.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, compress
 from statistics import fmean
@@ -22,7 +22,8 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
-from vdet.labels.label import Label, SavedTracks, boxes_of
+from vdet.labels.label import Frames, SavedTracks, boxes_of
+from vdet.track.track import Track
 
 MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""
@@ -113,17 +114,13 @@ class Comparison:
         return np.flatnonzero(2 * right < self.track_lengths())
 
 
-Frames = Mapping[int, Sequence[Label]]
-"""The labels of each frame by its number."""
-
-
 def compare(prediction: SavedTracks, truth: SavedTracks) -> Comparison:
     """Compare predictions with the truth of the same video, as `compare_frames` does.
 
     Predictions in frames that the truth does not cover are omitted. If it covers only the beginning
     of the video, cut the predictions with `until` first; otherwise all later ones are false alarms.
     """
-    return compare_frames(prediction.by_frame(), truth.by_frame(), truth.covered)
+    return compare_frames(prediction.named_frames(), truth.named_frames(), truth.covered)
 
 
 def compare_frames(
@@ -151,8 +148,8 @@ def compare_frames(
     frames = []
     for number, (vehicles, tracks) in zip(numbers, counting, strict=True):
         if vehicles or tracks:
-            of_vehicles = np.searchsorted(vehicle_ids, [vehicle.track.id for vehicle in vehicles])
-            of_tracks = np.searchsorted(track_ids, [label.track.id for label in tracks])
+            of_vehicles = np.searchsorted(vehicle_ids, [vehicle.id for vehicle in vehicles])
+            of_tracks = np.searchsorted(track_ids, [track.id for track in tracks])
             vehicle_boxes, track_boxes = boxes_of(vehicles), boxes_of(tracks)
             iou = iou_matrix(vehicle_boxes, track_boxes)
             together = partners[of_vehicles][:, np.newaxis] == of_tracks
@@ -164,7 +161,7 @@ def compare_frames(
                 tracks=of_tracks,
                 vehicle_boxes=vehicle_boxes,
                 track_boxes=track_boxes,
-                scores=np.array([label.track.score for label in tracks], np.float64),
+                scores=np.array([track.score for track in tracks], np.float64),
                 iou=iou,
                 rows=rows,
                 columns=columns,
@@ -173,12 +170,12 @@ def compare_frames(
             if iou.size:
                 partners[:] = UNMATCHED
                 partners[frame.paired_vehicles] = frame.pairing_tracks
-    true_labels = (label for labels in truth.values() for label in labels if not label.ignored)
+    true_tracks = (track for tracks in truth.values() for track in tracks if not track.ignored)
     return Comparison(
         frames=tuple(frames),
         vehicle_ids=vehicle_ids,
         track_ids=track_ids,
-        vehicle_names=_names(vehicle_ids, true_labels),
+        vehicle_names=_names(vehicle_ids, true_tracks),
         track_names=_names(track_ids, chain.from_iterable(prediction.values())),
     )
 
@@ -221,10 +218,10 @@ def joined(arrays: Iterable[Int64Array]) -> Int64Array:
     return np.concatenate([np.empty(0, np.int64), *arrays])
 
 
-def _counting(tracks: Sequence[Label], truth: Sequence[Label]) -> tuple[list[Label], list[Label]]:
+def _counting(tracks: Sequence[Track], truth: Sequence[Track]) -> tuple[list[Track], list[Track]]:
     """Return the vehicles and the predictions of a frame that count."""
-    vehicles = [label for label in truth if not label.ignored]
-    regions, boxes = boxes_of(label for label in truth if label.ignored), boxes_of(tracks)
+    vehicles = [track for track in truth if not track.ignored]
+    regions, boxes = boxes_of(track for track in truth if track.ignored), boxes_of(tracks)
     iou = iou_matrix(boxes_of(vehicles), boxes)
     _, paired = assign(np.where(at_least(iou, MATCH_IOU), iou, 0))
     counts = np.array([not track.ignored for track in tracks], np.bool_)
@@ -245,14 +242,14 @@ def assign(values: Float64Array) -> tuple[Int64Array, Int64Array]:
     return rows[is_pair], columns[is_pair]
 
 
-def _ids(labels: Iterable[Label]) -> Int64Array:
-    """Return the ids of labels, each once, ascending."""
-    return np.unique(np.array([label.track.id for label in labels], np.int64))
+def _ids(tracks: Iterable[Track]) -> Int64Array:
+    """Return the ids of tracks, each once, ascending."""
+    return np.unique(np.array([track.id for track in tracks], np.int64))
 
 
-def _names(ids: Int64Array, labels: Iterable[Label]) -> tuple[str, ...]:
-    """Return the last class of each id in the labels."""
-    names = {x.track.id: x.track.class_name for x in labels if x.track.class_name}
+def _names(ids: Int64Array, tracks: Iterable[Track]) -> tuple[str, ...]:
+    """Return the last class of each id in the tracks."""
+    names = {track.id: track.class_name for track in tracks if track.class_name}
     return tuple(names.get(id_, UNKNOWN) for id_ in ids.tolist())
 
 

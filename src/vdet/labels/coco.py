@@ -14,8 +14,7 @@ of CVAT, `dataset_manager/bindings.py`.
 
 import json
 from codecs import BOM_UTF8
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -34,7 +33,6 @@ from vdet.labels.label import (
     LIMIT,
     NO_ID,
     Index,
-    Label,
     Number,
     SavedTracks,
     Size,
@@ -119,7 +117,7 @@ def write_coco_images(file: BinaryIO, images: Sequence[LabelledImage]) -> None:
         assert image.size
         (width, height), name = image.size, valid_text(image.path.as_posix())
         writer.add("images", id=number, file_name=name, width=width, height=height)
-        for track in (label.track for label in image.labels):
+        for track in image.labels:
             category = writer.category(track.class_name or UNKNOWN)
             writer.add_box(number, track.box, category, track.score)
     writer.end(file)
@@ -153,20 +151,21 @@ class _Annotation:
     foot: tuple[Number, Number] | None = None
     attributes: _Attributes | None = None
 
-    def label(self, position: str, name: str, frame: int) -> Label:
-        """Return the box as a label of a frame; `NO_ID` without a track."""
+    def track(self, position: str, name: str) -> Track:
+        """Return the box with this name; `NO_ID` without a track."""
         attributes = self.attributes or _Attributes()
         id_ = attributes.track_id if self.track_id is None else self.track_id
         x, y, width, height = self.bbox
-        track = Track(
+        return Track(
             id_ if isinstance(id_, int) and 0 <= id_ <= LIMIT else NO_ID,
             Box.sized(x, y, width, height),
             self.score,
             "predicted" if attributes.occluded else "detected",
             name,
             self.foot,
+            position=position,
+            ignored=self.iscrowd,
         )
-        return Label(track, position, frame, ignored=self.iscrowd)
 
 
 @_entry
@@ -231,18 +230,20 @@ def _read(path: Path, data: bytes) -> _CocoDocument:
     return document
 
 
-def _labels(path: Path, document: _CocoDocument, frames: Mapping[int, int]) -> Iterator[Label]:
-    """Yield the label of each annotation; `frames` are those of images by their ids.
+def _by_image(path: Path, document: _CocoDocument) -> dict[int, list[Track]]:
+    """Return the boxes of each image by its id.
 
-    Raises `TruthError` if an image or a category is missing.
+    Raises `TruthError` if an annotation refers to a missing image or category.
     """
     names = {category.id: category.name for category in document.categories}
+    boxes: dict[int, list[Track]] = {image.id: [] for image in document.images}
     for number, entry in enumerate(document.annotations):
         position = f"annotations.{number}"
-        if entry.image_id not in frames or entry.category_id not in names:
+        if entry.image_id not in boxes or entry.category_id not in names:
             message = f"image {entry.image_id} or category {entry.category_id} not found"
             raise line_error(path, position, message)
-        yield entry.label(position, names[entry.category_id], frames[entry.image_id])
+        boxes[entry.image_id].append(entry.track(position, names[entry.category_id]))
+    return boxes
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -256,11 +257,9 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     """
     document = _read(path, data)
     images = {image.frame: image for image in document.images if image.frame is not None}
-    frames = {image.id: image.frame or 0 for image in document.images}
-    labels = tuple(_labels(path, document, frames))
-    if any(image.frame is None for image in document.images) or NO_ID in {
-        label.track.id for label in labels
-    }:
+    boxes = _by_image(path, document)
+    ids = {track.id for tracks in boxes.values() for track in tracks}
+    if any(image.frame is None for image in document.images) or NO_ID in ids:
         raise TruthError(
             f"{path}: needs the frame_index of each image and the track_id of each annotation; in "
             "CVAT, draw each box as a track"
@@ -273,7 +272,8 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         if image.time is not None
     }
     size = document.images[0].size if images else None
-    saved = SavedTracks(labels, tuple(sorted(images)), checked_times(path, times), size)
+    frames = {frame: boxes[image.id] for frame, image in images.items() if boxes[image.id]}
+    saved = SavedTracks(frames, tuple(sorted(images)), checked_times(path, times), size)
     video = document.videos[0].vdet if document.videos else None
     return saved.of_video(video) if video else saved
 
@@ -299,16 +299,13 @@ def read_coco_images(path: Path) -> Iterator[LabelledImage]:
         occurs twice, or an image is outside the set.
     """
     document = _read(path, read_bytes(path))
-    by_image: dict[int, list[Label]] = defaultdict(list)
-    labels = _labels(path, document, dict.fromkeys((image.id for image in document.images), 0))
-    for entry, label in zip(document.annotations, labels, strict=True):
-        by_image[entry.image_id].append(label)
+    boxes = _by_image(path, document)
     names = image_names(path, [image.file_name for image in document.images])
     for image, name in zip(document.images, names, strict=True):
         yield LabelledImage(
             path=name,
             file=path,
-            labels=tuple(by_image[image.id]),
+            labels=tuple(boxes[image.id]),
             size=image.size,
             unlabelled=document.info.unlabelled_classes if document.info else (),
         )

@@ -21,7 +21,6 @@ from vdet.errors import ConfigError, ImageError, TruthError, printable
 from vdet.files import is_hidden
 from vdet.labels.label import (
     NO_ID,
-    Label,
     Size,
     line_error,
     numbered_lines,
@@ -50,7 +49,7 @@ class LabelledImage:
 
     path: Path
     file: Path
-    labels: tuple[Label, ...] = ()
+    labels: tuple[Track, ...] = ()
     size: Size | None = None
     unlabelled: tuple[str, ...] = ()
 
@@ -159,8 +158,8 @@ def _class_names(path: Path) -> dict[float, str]:
     return {float(number): name for number, name in enumerate(names)}
 
 
-def _labels(path: Path, names: Mapping[float, str], size: Size) -> Iterator[Label]:
-    """Yield the label of each line: a box, or a polygon with three points or more, as its box.
+def _labels(path: Path, names: Mapping[float, str], size: Size) -> Iterator[Track]:
+    """Yield the box of each line: a box, or a polygon with three points or more, as its box.
 
     Points less than a pixel outside the image are moved to its side.
     """
@@ -186,7 +185,7 @@ def _labels(path: Path, names: Mapping[float, str], size: Size) -> Iterator[Labe
             middle, sides = points
             points = np.array([middle - sides / 2, middle + sides / 2])
         (x1, y1), (x2, y2) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-        yield Label(Track(NO_ID, Box(x1, y1, x2, y2), 1.0, "detected", name), line)
+        yield Track(NO_ID, Box(x1, y1, x2, y2), 1.0, "detected", name, position=line)
 
 
 def read_yolo_images(images: Path, labels: Path) -> Iterator[LabelledImage]:

@@ -10,9 +10,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path, PurePath, PurePosixPath
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 import pydantic
@@ -37,34 +38,8 @@ Size = tuple[int, int]
 """Width and height in pixels."""
 
 
-class Label(NamedTuple):
-    """A track, or another box, as it stands in a file.
-
-    There may be millions, and a frozen dataclass takes six times as long to make.
-
-    Attributes
-    ----------
-    track
-        Its `class_name` is its name in the file, and its `id` is `NO_ID` if it has none. Its score
-        is 1 if it has none, and may be any number in MOTChallenge.
-    position
-        Its line in the file, or a name of its position, such as "annotations.3".
-    frame
-        Number of the frame, from 0; 0 in an image.
-    ignored
-        Whether it is an ignore region, not a vehicle.
-    """
-
-    track: Track
-    position: int | str = 0
-    frame: int = 0
-    ignored: bool = False
-
-    def named(self, name: str | None, score: float | None = None) -> "Label":
-        """Return it with another name, and another score if one is given."""
-        track = self.track
-        score = track.score if score is None else score
-        return self._replace(track=replace(track, class_name=name, score=score))
+Frames = Mapping[int, Sequence[Track]]
+"""The boxes of each frame that has one, by its number from 0, in the order of a file."""
 
 
 def may_be_same(first: str, second: str) -> bool:
@@ -73,9 +48,9 @@ def may_be_same(first: str, second: str) -> bool:
     return all(a == b for a, b in zip(*paths, strict=False))
 
 
-def boxes_of(labels: Iterable[Label]) -> Float64Array:
-    """Return x1, y1, x2, y2 of labels in pixels from 0, float64 `(n, 4)`."""
-    boxes = (label.track.box for label in labels)
+def boxes_of(tracks: Iterable[Track]) -> Float64Array:
+    """Return x1, y1, x2, y2 of tracks in pixels from 0, float64 `(n, 4)`."""
+    boxes = (track.box for track in tracks)
     return np.array([(b.x1, b.y1, b.x2, b.y2) for b in boxes], np.float64).reshape(-1, 4)
 
 
@@ -84,8 +59,8 @@ def line_error(path: Path | str, position: int | str, message: str) -> TruthErro
     return TruthError(f"{path}:{position}: {message}")
 
 
-def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
-    """Return the labels of the file `path` if they can all be boxes of one video.
+def check_frames(path: Path, frames: Frames) -> None:
+    """Check that the boxes of the file `path` can all be of one video.
 
     Raises
     ------
@@ -93,21 +68,19 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
         A frame before the first, a negative id of a vehicle, an id twice in a frame, or a box
         without area.
     """
-    checked = tuple(labels)
-    keys: set[tuple[int, int]] = set()
-    for label in checked:
-        mistake, id_ = mistake_in_box(label.track.box), label.track.id
-        key = label.frame, id_
-        if label.frame < 0:
-            mistake = "the frame comes before the video's first"
-        elif id_ < (NO_ID if label.ignored else 0):
-            mistake = f"id {id_} is negative; number the vehicles from 0 or 1"
-        elif key in keys and id_ != NO_ID:
-            mistake = f"id {id_} occurs twice in the same frame"
-        if mistake is not None:
-            raise line_error(path, label.position, mistake)
-        keys.add(key)
-    return checked
+    for index, tracks in frames.items():
+        ids = set[int]()
+        for track in tracks:
+            mistake, id_ = mistake_in_box(track.box), track.id
+            if index < 0:
+                mistake = "the frame comes before the video's first"
+            elif id_ < (NO_ID if track.ignored else 0):
+                mistake = f"id {id_} is negative; number the vehicles from 0 or 1"
+            elif id_ in ids and id_ != NO_ID:
+                mistake = f"id {id_} occurs twice in the same frame"
+            if mistake is not None:
+                raise line_error(path, track.position, mistake)
+            ids.add(id_)
 
 
 def mistake_in_box(box: Box) -> str | None:
@@ -173,7 +146,7 @@ class SavedTracks:
 
     Attributes
     ----------
-    labels
+    frames
         The boxes, exactly as in the file.
     covered
         The frames that the file covers, also those without a box, counted from 0, ascending; None:
@@ -190,7 +163,7 @@ class SavedTracks:
         What the file says of its video; None for formats that cannot hold it.
     """
 
-    labels: tuple[Label, ...]
+    frames: Frames
     covered: Sequence[int] | None = None
     times: Mapping[int, float] = field(default_factory=dict)
     size: tuple[int, int] | None = None
@@ -258,30 +231,33 @@ class SavedTracks:
         `STANDARD_CLASSES` if the label means one, else the label. An unknown time is NaN: see
         `has_times`.
         """
-        frames, before = self.by_frame(), -math.inf
+        frames, before = self.named_frames(), -math.inf
         cuts = [first for item in self.findings if item.code == "cut" for first, _ in item.spans]
         for index in sorted(self._indices()):
-            tracks = sorted((label.track for label in frames.get(index, ())), key=attrgetter("id"))
+            tracks = sorted(frames.get(index, ()), key=attrgetter("id"))
             time = self.times.get(index, math.nan)
             is_cut = any(before < cut - _ROUNDING <= time for cut in cuts)
             before = time
             yield FrameTracks(index, time, tuple(tracks), is_cut=is_cut)
 
-    def by_frame(self) -> dict[int, list[Label]]:
-        """Return the labels by the number of their frame, ascending.
+    @property
+    def tracks(self) -> Iterator[Track]:
+        """The boxes of all frames."""
+        return chain.from_iterable(self.frames.values())
 
-        A name is one of `STANDARD_CLASSES` if it means one. The labels of a frame keep their order.
-        """
-        names = {
-            name: name and (standard_class(name) or name)
-            for name in {label.track.class_name for label in self.labels}
+    def named_frames(self) -> Frames:
+        """Return the frames, ascending, with `STANDARD_CLASSES` for the names that mean one."""
+        words = {track.class_name for track in self.tracks}
+        names = {word: word and (standard_class(word) or word) for word in words}
+        return {
+            index: [
+                track
+                if names[track.class_name] == track.class_name
+                else replace(track, class_name=names[track.class_name])
+                for track in tracks
+            ]
+            for index, tracks in sorted(self.frames.items())
         }
-        frames: dict[int, list[Label]] = {}
-        for label in sorted(self.labels, key=attrgetter("frame")):
-            name = names[label.track.class_name]
-            named = label if name == label.track.class_name else label.named(name)
-            frames.setdefault(label.frame, []).append(named)
-        return frames
 
     @property
     def length(self) -> int:
@@ -290,9 +266,9 @@ class SavedTracks:
 
     def until(self, end: int) -> "SavedTracks":
         """Return the frames before `end`."""
-        labels = tuple(label for label in self.labels if label.frame < end)
+        frames = {at: tracks for at, tracks in self.frames.items() if at < end}
         covered = None if self.covered is None else [at for at in self.covered if at < end]
-        return replace(self, labels=labels, covered=covered)
+        return replace(self, frames=frames, covered=covered)
 
     def spread(self, every: int, first: int, end: int) -> set[int]:
         """Return covered frames from `first` until before `end`, each `every` or more apart."""
@@ -305,14 +281,14 @@ class SavedTracks:
 
     def check_end(self, video: Path, frames: int) -> None:
         """Raise `TruthError` if there is a box beyond the last frame of the file `video`."""
-        count = max((label.frame + 1 for label in self.labels), default=0)
+        count = max(self.frames, default=-1) + 1
         if count > frames:
             raise TruthError(
                 f"{video}: has {frames} frames, but its ground truth has a box in frame {count}"
             )
 
     def _indices(self) -> set[int]:
-        return {label.frame for label in self.labels}.union(self.covered or ())
+        return set(self.frames).union(self.covered or ())
 
 
 LIMIT = 10_000_000

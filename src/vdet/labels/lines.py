@@ -28,7 +28,6 @@ from vdet.labels.formats import VIDEO, Format
 from vdet.labels.label import (
     LIMIT,
     Index,
-    Label,
     Number,
     SavedTracks,
     SourceVideo,
@@ -70,9 +69,9 @@ class _BoxFields:
     distance: Number | None = None
     lane: _Whole | None = None
 
-    def label(self, line: int, frame: int) -> Label:
-        """Return the box as a label of a frame."""
-        track = Track(
+    def track(self, line: int) -> Track:
+        """Return the box of a line."""
+        return Track(
             self.id,
             Box.sized(self.x, self.y, self.width, self.height),
             1.0 if self.score is None else self.score,
@@ -81,8 +80,8 @@ class _BoxFields:
             self.foot,
             self.distance,
             self.lane,
+            line,
         )
-        return Label(track, line, frame)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,7 +165,7 @@ def read_json_lines(path: Path, data: bytes, *, is_head: bool = False) -> SavedT
         The file is empty or cut off, or has a second video, a line is not such a record, frames do
         not increase, or a time is wrong.
     """
-    labels: list[Label] = []
+    frames: dict[int, list[Track]] = {}
     times: Times = {}
     first, last, is_whole = None, -1, False
     for line, content in numbered_lines(path, data):
@@ -178,13 +177,14 @@ def read_json_lines(path: Path, data: bytes, *, is_head: bool = False) -> SavedT
             raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
         first, last = first or record, record.frame
         times[last] = line, record.time
-        labels += [box.label(line, last) for box in record.tracks]
+        if record.tracks:
+            frames[last] = [box.track(line) for box in record.tracks]
     if first is None:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
     if first.last is False and not (is_whole or is_head):
         raise TruthError(f"{path}: is cut off after frame {last}; copy or write it again")
     seconds, begin = checked_times(path, times), _begin(path, times[first.frame], first.clock)
-    saved = SavedTracks(tuple(labels), tuple(seconds), seconds, begin=begin)
+    saved = SavedTracks(frames, tuple(seconds), seconds, begin=begin)
     video = first.video and replace(first.video, findings=record.findings)
     return saved.of_video(video) if video else saved
 
@@ -200,16 +200,16 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         A column is missing or appears twice, a row has a wrong number of cells, a cell has a wrong
         type, or a time is wrong.
     """
-    labels: list[Label] = []
+    frames: dict[int, list[Track]] = {}
     times: Times = {}
     begin = None
     for line, cells in _csv_rows(path, data):
         row = _checked(path, line, _ROW.validate_python, cells)
         times[row.frame] = line, row.time
-        labels.append(row.label(line, row.frame))
-        if len(labels) == 1:
+        if not frames:
             begin = _begin(path, times[row.frame], row.clock)
-    return SavedTracks(tuple(labels), times=checked_times(path, times), begin=begin)
+        frames.setdefault(row.frame, []).append(row.track(line))
+    return SavedTracks(frames, times=checked_times(path, times), begin=begin)
 
 
 def _csv_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -305,8 +305,9 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
         A line has a wrong number of columns, or another one than the first line, a column is not a
         number, or a flag is neither 0 nor 1.
     """
-    classes = set[str]()
-    saved = SavedTracks(tuple(_mot_labels(path, data, classes)))
+    classes, frames = set[str](), dict[int, list[Track]]()
+    for frame, track in _mot_tracks(path, data, classes):
+        frames.setdefault(frame, []).append(track)
     if 1 < len(classes) <= _MAX_CLASSES:
         numbers = ", ".join(sorted(classes, key=int))
         _log.warning(
@@ -315,11 +316,11 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
             path,
             numbers,
         )
-    return saved
+    return SavedTracks(frames)
 
 
-def _mot_labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
-    """Yield the label of each line, and put the classes of vehicles into `classes`."""
+def _mot_tracks(path: Path, data: bytes, classes: set[str]) -> Iterator[tuple[int, Track]]:
+    """Yield the frame and the box of each line, and put the classes of vehicles into `classes`."""
     separator = "," if b"," in data.lstrip().partition(b"\n")[0] else None
     counts: tuple[int, ...] = _TRUTH_COLUMNS, _RESULT_COLUMNS
     for line, content in numbered_lines(path, data):
@@ -338,8 +339,8 @@ def _mot_labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
         if row.score and columns[7].strip().isdecimal():
             classes.add(columns[7].strip())
         box = Box.sized(row.left - 1, row.top - 1, row.width, row.height)
-        track = Track(row.id, box, 1.0 if is_truth else row.score, "detected")
-        yield Label(track, line, row.frame - 1, ignored=is_truth and row.score == 0)
+        score, ignored = 1.0 if is_truth else row.score, is_truth and row.score == 0
+        yield row.frame - 1, Track(row.id, box, score, "detected", position=line, ignored=ignored)
 
 
 MOT = Format("MOTChallenge", ".txt", read_mot, _mot_lines)

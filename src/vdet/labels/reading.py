@@ -20,19 +20,19 @@ from vdet.config.schema import Role, Settings
 from vdet.errors import TruthError, printable, quantity
 from vdet.files import is_hidden
 from vdet.labels.coco import read_coco_images
-from vdet.labels.formats import recognize, track_formats
+from vdet.labels.formats import Format, recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, is_file, read_yolo_images
 from vdet.labels.label import (
     NO_ID,
-    Label,
     SavedTracks,
     Size,
-    checked_labels,
+    check_frames,
     line_error,
     mistake_in_box,
     read_bytes,
 )
 from vdet.labels.lines import MOT
+from vdet.track.track import Track
 
 _IGNORED = ("tram", "train", "misc", "trailer", "caravan", "rider")
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
@@ -139,13 +139,18 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
     gc.disable()  # labels have no cycles, and looking for some takes a quarter of the time
     try:
         saved = recognize(path, data).read(path, data)
-        regions = set(filter(is_region, {label.track.class_name for label in saved.labels}))
-        vehicles = [
-            label if 0 <= label.track.score <= 1 else _with_score(label)
-            for label in saved.labels
-            if not (label.ignored or label.track.class_name in regions)
-        ]
-        saved = replace(saved, labels=checked_labels(path, vehicles)).from_first_frame()
+        regions = set(filter(is_region, {track.class_name for track in saved.tracks}))
+        frames = {}
+        for index, tracks in saved.frames.items():
+            vehicles = [
+                item if 0 <= item.score <= 1 else replace(item, score=min(max(item.score, 0), 1))
+                for item in tracks
+                if not (item.ignored or item.class_name in regions)
+            ]
+            if vehicles:
+                frames[index] = vehicles
+        check_frames(path, frames)
+        saved = replace(saved, frames=frames).from_first_frame()
     finally:
         if was_enabled:
             gc.enable()
@@ -154,11 +159,6 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
         fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
         raise TruthError(f"{path}: {fault}")
     return saved if rate is None else saved.at_rate(rate)
-
-
-def _with_score(label: Label) -> Label:
-    """Return a label with the nearest score from 0 to 1."""
-    return label.named(label.track.class_name, min(max(label.track.score, 0.0), 1.0))
 
 
 _HEAD_LINES, _MAX_LINE = 3, 1_000_000
@@ -178,7 +178,7 @@ def read_head(path: Path) -> SavedTracks:
         form = recognize(path, b"".join(lines))
         if form.read_head:
             return form.read_head(path, b"".join(lines)).from_first_frame()
-    return SavedTracks(())
+    return SavedTracks({})
 
 
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:
@@ -205,33 +205,36 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:
         raise TruthError(f"{path}: is empty; ground truth must be a file of {names}")
     form = recognize(path, data)
     saved = form.read(path, data)
-    labels: Iterable[Label] = saved.labels
-    if form is MOT:  # in the older variant, the score is the flag
-        labels = [
-            label._replace(ignored=label.track.score == 0 or label.ignored) for label in labels
-        ]
-        regions = path.with_stem(re.sub(r"_gt(_whole)?$", "_gt_ignore", path.stem))
-        if regions != path and regions.is_file():
-            more = form.read(regions, read_bytes(regions)).labels
-            labels += (Label(replace(x.track, id=NO_ID), x.position, x.frame, True) for x in more)
-    checked = checked_labels(path, _with_roles(path, labels, roles))
-    if checked and all(label.ignored for label in checked):
+    frames = {
+        index: list(_with_roles(path, form, tracks, roles))
+        for index, tracks in saved.frames.items()
+    }
+    regions = path.with_stem(re.sub(r"_gt(_whole)?$", "_gt_ignore", path.stem))
+    if form is MOT and regions != path and regions.is_file():
+        for index, tracks in form.read(regions, read_bytes(regions)).frames.items():
+            ignored = (replace(track, id=NO_ID, ignored=True) for track in tracks)
+            frames.setdefault(index, []).extend(ignored)
+    saved = replace(saved, frames={index: tracks for index, tracks in frames.items() if tracks})
+    check_frames(path, saved.frames)
+    if saved.frames and all(track.ignored for track in saved.tracks):
         flags = "; column 7 is 0 in all lines" if form is MOT else ""
         _log.warning("%s: has no vehicle, only ignore regions%s", path, flags)
-    return replace(saved, labels=checked)
+    return saved
 
 
-def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:
+def _with_roles(path: Path, form: Format, tracks: Iterable[Track], roles: Roles) -> Iterator[Track]:
     """Yield vehicles and ignore regions; the name of each is the class of its label."""
-    for label in labels:
-        name = label.track.class_name
+    for track in tracks:
+        name = track.class_name
         role = "vehicle" if name is None else roles.role_of(name)
         if role is None:
             message = f"label {name!r:.40} is unknown; set its role in labels.roles"
-            raise line_error(path, label.position, message)
+            raise line_error(path, track.position, message)
         if role != "other":
-            named = label.named(name and (roles.class_of(name) or "vehicle"), 1.0)
-            yield named._replace(ignored=label.ignored or role == "ignored")
+            # In the older variant of MOTChallenge, the score is the flag.
+            ignored = track.ignored or role == "ignored" or (form is MOT and track.score == 0)
+            name = name and (roles.class_of(name) or "vehicle")
+            yield replace(track, class_name=name, score=1.0, ignored=ignored)
 
 
 def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledImages:
@@ -249,7 +252,7 @@ def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledIm
     TruthError
         There is no labelled set, or it has a mistake; the message names its position.
     """
-    return checked_images(str(path), _images(path), roles)
+    return _checked_images(str(path), _images(path), roles)
 
 
 _PERCENT = 100
@@ -258,9 +261,7 @@ _SLACK = 0.1
 """How far a box may extend beyond a side of the image, as a fraction of it."""
 
 
-def checked_images(
-    name: str, images: Iterable[LabelledImage], roles: Roles = DEFAULT_ROLES
-) -> LabelledImages:
+def _checked_images(name: str, images: Iterable[LabelledImage], roles: Roles) -> LabelledImages:
     """Check the labels of a set, and omit the labels that are not vehicles.
 
     A duplicate label in an image counts once, with a warning.
@@ -276,22 +277,17 @@ def checked_images(
     boxes = repeated = absurd = 0
     farthest, smallest = 0.0, math.inf
     for image in images:
-        labels = tuple(
-            {
-                (label.track.box, label.track.class_name, label.ignored): label
-                for label in image.labels
-            }.values()
-        )
+        labels = {(x.box, x.class_name, x.ignored): x for x in image.labels}.values()
         boxes += len(labels)
         repeated += len(image.labels) - len(labels)
-        absurd += sum(_is_absurd(label.track.box, image.size) for label in labels)
-        farthest = max([farthest, *(max(astuple(label.track.box)) for label in labels)])
+        absurd += sum(_is_absurd(label.box, image.size) for label in labels)
+        farthest = max([farthest, *(max(astuple(label.box)) for label in labels)])
         smallest = min(smallest, *(image.size or (0,)))
         if image.path in checked:
             raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
         checked[image.path] = replace(
             image,
-            labels=tuple(_image_labels(replace(image, labels=labels), roles, omitted, ignored)),
+            labels=tuple(_image_labels(image, labels, roles, omitted, ignored)),
             unlabelled=tuple(filter(None, map(roles.class_of, image.unlabelled))),
         )
     if not checked:
@@ -323,23 +319,26 @@ def _is_absurd(box: Box, size: Size | None) -> bool:
 
 
 def _image_labels(
-    image: LabelledImage, roles: Roles, omitted: Counter[str], ignored: Counter[str]
-) -> Iterator[Label]:
+    image: LabelledImage,
+    labels: Iterable[Track],
+    roles: Roles,
+    omitted: Counter[str],
+    ignored: Counter[str],
+) -> Iterator[Track]:
     """Yield the vehicles and ignore regions of an image, and count the other labels."""
     if not is_file(image.path):
         raise TruthError(f"{printable(str(image.path))}: not found, but {image.file} labels it")
-    for label in image.labels:
-        name = label.track.class_name or ""
+    for label in labels:
+        name = label.class_name or ""
         role = roles.role_of(name)
         if role not in ("vehicle", "ignored"):
             omitted[name] += 1
             continue
-        if mistake := mistake_in_box(label.track.box):
+        if mistake := mistake_in_box(label.box):
             raise line_error(image.file, label.position, mistake)
         ignored.update([name] if role == "ignored" and not label.ignored else [])
         is_ignored = label.ignored or role == "ignored"
-        named = label.named(roles.class_of(name) or "vehicle")
-        yield named._replace(ignored=is_ignored)
+        yield replace(label, class_name=roles.class_of(name) or "vehicle", ignored=is_ignored)
 
 
 def _images(path: Path) -> Iterable[LabelledImage]:

@@ -41,6 +41,11 @@ class Track:
     lane
         0 for the camera's lane, 1 for the next one to the right, -1 to the left and so on; None if
         unknown.
+    position
+        Where the box stands in the file that it was read from: its line, or a name such as
+        "annotations.3". Its class is then named as there, and its score 1 if there is none.
+    ignored
+        Whether it is an ignore region of labelled images or videos, not a vehicle.
     """
 
     id: int
@@ -51,6 +56,8 @@ class Track:
     whole_foot: tuple[float, float] | None = None
     distance: float | None = None
     lane: int | None = None
+    position: int | str = field(default=0, compare=False)
+    ignored: bool = False
 
     @property
     def foot(self) -> tuple[float, float]:

@@ -104,13 +104,16 @@ def count_files(
 
 def _without_people(path: Path, saved: SavedTracks, settings: Settings) -> SavedTracks:
     """Return the tracks of another tool without people, with a warning, as a run has none."""
-    names = {label.track.class_name for label in saved.labels}
+    names = {track.class_name for track in saved.tracks}
     people = {name for name in names if name and standard_class(name) == "person"}
     if not people or "person" in settings.detector.vehicle_classes:
         return saved
     _log.warning("%s: people are not counted; to count them, use --class person", path)
-    labels = tuple(label for label in saved.labels if label.track.class_name not in people)
-    return replace(saved, labels=labels)
+    frames = {
+        index: [track for track in tracks if track.class_name not in people]
+        for index, tracks in saved.frames.items()
+    }
+    return replace(saved, frames={index: kept for index, kept in frames.items() if kept})
 
 
 def count_frames(
@@ -380,6 +383,7 @@ def _gap(
 
 def _between(saved: SavedTracks, first: float, last: float) -> SavedTracks:
     """Return the frames from one time to another, seconds."""
-    labels = (label for label in saved.labels if first <= saved.times[label.frame] <= last)
-    covered = [index for index in saved.covered or () if first <= saved.times[index] <= last]
-    return replace(saved, labels=tuple(labels), covered=covered)
+    times = saved.times
+    frames = {at: tracks for at, tracks in saved.frames.items() if first <= times[at] <= last}
+    covered = [index for index in saved.covered or () if first <= times[index] <= last]
+    return replace(saved, frames=frames, covered=covered)

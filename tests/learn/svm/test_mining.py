@@ -12,7 +12,6 @@ from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError
-from vdet.labels.label import Label
 from vdet.learn.svm.mining import (
     ChosenWindow,
     MiningLimits,
@@ -32,9 +31,9 @@ OTHER = Box.sized(700, 300, 100, 70)
 GENEROUS = MiningLimits(per_vehicle=1000, false_alarms=1000, parts=1000, probability=0.2)
 
 
-def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> list[Label]:
+def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> list[Track]:
     return [
-        Label(Track(0, box, 1.0, "detected"), ignored=number >= len(vehicles))
+        Track(0, box, 1.0, "detected", ignored=number >= len(vehicles))
         for number, box in enumerate((*vehicles, *ignored))
     ]
 
@@ -53,7 +52,7 @@ def windows(*boxes: Box) -> Windows:
 
 
 def chosen(
-    found: Windows, labels: list[Label], limits: MiningLimits = GENEROUS
+    found: Windows, labels: list[Track], limits: MiningLimits = GENEROUS
 ) -> list[ChosenWindow]:
     rng = np.random.default_rng(0)
     return list(choose_windows(found, labels, WIDTH, rng, limits=limits))

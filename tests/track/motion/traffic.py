@@ -13,7 +13,7 @@ from track.motion.scenes import HEIGHT, WIDTH
 from vdet.boxes import Box, Boxes, Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores, score
-from vdet.labels.label import NO_ID, Label, SavedTracks
+from vdet.labels.label import NO_ID, SavedTracks
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import Track
 
@@ -146,16 +146,18 @@ def track_scores(
     """
     rng = np.random.default_rng(seed)
     tracker = MotionTracker(MotionTrackerSettings(), WIDTH, HEIGHT)
-    true, shown = [], []
+    true, shown = dict[int, list[Track]](), dict[int, list[Track]]()
     for number, vehicles in enumerate(clip, start=1):
-        for vehicle in vehicles:
-            id_ = vehicle.id if vehicle.counts else NO_ID
-            track = Track(id_, Box.of(vehicle.box.tolist()), 1.0, "detected")
-            true.append(Label(track, frame=number, ignored=not vehicle.counts))
+        true[number] = [
+            Track(
+                *(vehicle.id if vehicle.counts else NO_ID, Box.of(vehicle.box.tolist()), 1.0),
+                state="detected",
+                ignored=not vehicle.counts,
+            )
+            for vehicle in vehicles
+        ]
         if (number - 1) % stride:
-            tracks = tracker.at(number / rate)
+            shown[number] = tracker.at(number / rate)
         else:
-            tracks = tracker.update(detect(vehicles, noise, rng), number / rate)
-        shown += [Label(track, frame=number) for track in tracks]
-    videos = [SavedTracks(tuple(rows)) for rows in (shown, true)]
-    return score(*videos)
+            shown[number] = tracker.update(detect(vehicles, noise, rng), number / rate)
+    return score(SavedTracks(shown), SavedTracks(true))

@@ -1,6 +1,6 @@
 """Labelled images and videos in memory, from which training images are drawn."""
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
@@ -13,7 +13,6 @@ from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
 from vdet.errors import printable, quantity
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.label import Label
 from vdet.labels.reading import Roles, read_truth
 from vdet.media.reader import VideoReader
 
@@ -156,13 +155,15 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> NetSource:
     roles = Roles.for_training(settings)
     saved = read_truth(truth, roles)
     used = saved.spread(EVERY, EVERY - 1, saved.length)
-    labels: dict[int, list[Label]] = defaultdict(list)
-    for label in saved.labels:
-        if label.frame in used:
-            name = roles.class_of(label.track.class_name or "car") or "vehicle"
-            labels[label.frame].append(label.named(name))
+    labels = {
+        index: [
+            replace(track, class_name=roles.class_of(track.class_name or "car") or "vehicle")
+            for track in saved.frames.get(index, ())
+        ]
+        for index in sorted(used)
+    }
     ignored = Counter(
-        label.track.class_name or "" for some in labels.values() for label in some if label.ignored
+        track.class_name or "" for some in labels.values() for track in some if track.ignored
     )
     labelled = LabelledImages(video.name, (), ignored=dict(ignored.most_common()))
 
@@ -202,9 +203,8 @@ def _sample(image: Image, labelled: LabelledImage, classes: Sequence[str]) -> Ne
     height, width = image.shape[:2]
     number = {name: index for index, name in enumerate(classes)}
     unlabelled = [number[name] for name in labelled.unlabelled if name in number]
-    tracks = [label.track for label in labelled.labels]
-    named = [number.get(track.class_name or "", UNLABELLED) for track in tracks]
-    boxes = [astuple(track.box) for track in tracks]
+    named = [number.get(label.class_name or "", UNLABELLED) for label in labelled.labels]
+    boxes = [astuple(label.box) for label in labelled.labels]
     boxes += [(0, 0, width, height)] * len(unlabelled)
     is_whole = np.repeat([False, True], [len(named), len(unlabelled)])
     sample = NetSample(

@@ -25,13 +25,14 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import cut_window, resize
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, TruthError, VideoError
-from vdet.labels.label import Label, boxes_of
+from vdet.labels.label import boxes_of
 from vdet.labels.reading import Roles, read_truth
 from vdet.learn.svm.patches import Sides, patch_archive
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import named_errors, peek
+from vdet.track.track import Track
 
 PatchKind = Literal["vehicle", "box", "false alarm", "part"]
 """`vehicle`: the window fits a vehicle. `box`: it shows one off its centre or of another size.
@@ -73,7 +74,7 @@ class ChosenWindow:
 
 def choose_windows(
     windows: Windows,
-    labels: Sequence[Label],
+    labels: Sequence[Track],
     frame_width: int,
     rng: np.random.Generator,
     *,
@@ -117,7 +118,7 @@ def choose_windows(
     yield from some("part", is_part, limits.parts)
 
 
-def _vehicles(labels: Iterable[Label]) -> Float64Array:
+def _vehicles(labels: Iterable[Track]) -> Float64Array:
     return boxes_of(label for label in labels if not label.ignored)
 
 
@@ -242,7 +243,7 @@ class VideoSource:
         first, end = self.first - 1, min(self.last or truth.length, truth.length)
         if end <= first:
             raise TruthError(f"{self.truth}: ends at frame {truth.length}; begin earlier")
-        regular, labels_by_frame = truth.spread(self.every, first, end), truth.by_frame()
+        regular, labelled = truth.spread(self.every, first, end), truth.frames
         read = 0
         with VideoReader(self.path, frames=end, settings=settings.input) as reader:
             width, advance = reader.info.width, progress(self.path.name, end)
@@ -251,7 +252,7 @@ class VideoSource:
                 detector = model.for_video(width, reader.info.height, images)
             for frame in frames:
                 read = frame.index + 1
-                labels = labels_by_frame.get(frame.index, [])
+                labels = labelled.get(frame.index, [])
                 cuts_off = any(_beside(box, width).any() for box in _vehicles(labels))
                 if frame.index in regular or (frame.index >= first and cuts_off):
                     windows, _ = detector.search(Picture(frame.image), None)

@@ -22,7 +22,7 @@ from vdet.labels.formats import (
     track_suffixes,
 )
 from vdet.labels.images import LabelledImage
-from vdet.labels.label import Label, SourceVideo
+from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.result import FrameResult, findings_in
@@ -127,8 +127,7 @@ class LabelSink(BaseSink):
         """Add an image."""
         name = self.context.places.get(result.source, Path(result.source.name))
         size = result.frame.picture.width, result.frame.picture.height
-        labels = tuple(map(Label, result.tracks))
-        self._images.append(LabelledImage(name, self.path, labels, size))
+        self._images.append(LabelledImage(name, self.path, result.tracks, size))
 
 
 LABELS = SinkKind(LabelSink, (COCO.suffix,), "labels of images", takes="images")
