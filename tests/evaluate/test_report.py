@@ -10,7 +10,7 @@ from labels.saving import Row, checked_video, row
 from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
 from vdet.boxes import Box, Boxes
-from vdet.evaluate.output import RunName
+from vdet.evaluate.output import RunName, table
 from vdet.evaluate.report import (
     DETECTED,
     TRUE,
@@ -131,3 +131,17 @@ class TestPictures:
         assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarm")
         for color in (TRUE, DETECTED):
             assert np.any((first.image == color).all(axis=2))
+
+
+def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
+    assert table(("name", "n"), [["a", "100"], ["longer", "1"]]) == [
+        "name      n",
+        "a       100",
+        "longer    1",
+    ]
+
+
+def test_a_run_names_its_detector_model_and_settings() -> None:
+    name = RunName("net", Path("x/a.onnx"), None, ("b=1",))
+    assert name.line.endswith(", detector net, model a.onnx, settings default b=1")
+    assert name.values["model"] == "x/a.onnx"

@@ -1,16 +1,23 @@
+"""Ground truth: what its labels mean, and its frames."""
+
+import math
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
-from labels.saving import car, checked_video, frame, row, written
+from labels.saving import Row, car, checked_video, frame, row, video_of, written
 from labels.writers import exported
 from vdet.boxes import Box
+from vdet.config.classes import STANDARD_CLASSES
+from vdet.config.loading import load_settings
 from vdet.errors import TruthError
 from vdet.evaluate.results import score_files
 from vdet.evaluate.scores import compare
 from vdet.labels.formats import Format, track_formats
+from vdet.labels.label import NO_ID, SavedTracks, SourceVideo, numbered_lines
 from vdet.labels.lines import MOT as MOT_FORMAT
-from vdet.labels.reading import read_truth
+from vdet.labels.reading import DEFAULT_ROLES, Roles, read_truth
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
 CSV = "frame,time,id,x,y,width,height,class\n0,0,7,11,21,30,40,car\n"
@@ -86,3 +93,174 @@ def test_what_is_found_after_the_last_vehicle_is_false(tmp_path: Path) -> None:
     result = score_files(found, path)
     assert (result.until, result.scores.false_positives, result.scores.vehicle_boxes) == (11, 2, 1)
     assert read_truth(path).until(8).length == 6
+
+
+@pytest.mark.parametrize(
+    ("labels", "role"),
+    [
+        (("Car", "van", "TRUCK", "lorry", "bus", "vehicle", "Pick-up", "tuk-tuk"), "vehicle"),
+        (("Motorbike", "Cyclist"), "vehicle"),
+        (("DontCare", "dont_care", "Ignore region", "Misc", "trailer"), "ignored"),
+        (("Pedestrian", "Person_sitting", "rider"), "ignored"),
+        (("cow", "traffic sign", ""), None),
+    ],
+)
+def test_labels_mean_the_same_in_any_spelling(labels: tuple[str, ...], role: str | None) -> None:
+    assert {DEFAULT_ROLES.role_of(label) for label in labels} == {role}
+
+
+def test_settings_give_words_another_role_and_add_new_ones() -> None:
+    changes = ("pedestrian=vehicle", "tram=other", "cow=ignored")
+    roles = Roles.from_settings(load_settings((), [f"labels.roles.{change}" for change in changes]))
+    names = ("person", "Tram", "cow", "misc", "car", "dont care")
+    assert list(map(roles.role_of, names)) == [
+        *("vehicle", "other", "ignored"),
+        *("ignored", "vehicle", "ignored"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("classes", "vehicles"),
+    [
+        (STANDARD_CLASSES, STANDARD_CLASSES),
+        (("car",), ("car",)),
+        (("truck", "tractor"), ("truck",)),
+    ],
+)
+def test_classes_that_the_detector_does_not_look_for_are_ignored(
+    classes: tuple[str, ...], vehicles: tuple[str, ...]
+) -> None:
+    roles = Roles.of({}, classes)
+    assert {name: roles.role_of(name) for name in STANDARD_CLASSES} == {
+        name: "vehicle" if name in vehicles else "ignored" for name in STANDARD_CLASSES
+    }
+    assert all(roles.role_of(name) == "vehicle" for name in classes)
+
+
+def test_a_class_that_the_detector_finds_is_never_left_out() -> None:
+    changes = ['detector.classes=["car", "bicycle"]', "labels.roles.cyclist=other"]
+    roles = Roles.from_settings(load_settings((), [*changes, "labels.roles.person=other"]))
+    found = {word: roles.role_of(word) for word in ("car", "bicycle", "person")}
+    assert found == {"car": "vehicle", "bicycle": "ignored", "person": "other"}
+
+
+def test_a_detector_of_vehicles_looks_for_cars_trucks_and_buses() -> None:
+    settings = load_settings((), ['detector.classes=["vehicle"]'])
+    roles = Roles.from_settings(settings)
+    wanted = [name for name in STANDARD_CLASSES if roles.role_of(name) == "vehicle"]
+    assert wanted == ["car", "truck", "bus", "vehicle"]
+
+
+@pytest.mark.parametrize(
+    ("classes", "learnt"),
+    [
+        (["car", "tractor"], {"Car": "car", "tractor": "tractor", "rickshaw": "vehicle"}),
+        (["person"], {"pedestrian": "person"}),
+    ],
+)
+def test_a_network_learns_its_classes_and_vehicles_of_unknown_kind(
+    classes: list[str], learnt: dict[str, str]
+) -> None:
+    roles = Roles.for_training(load_settings((), [f"train.net.classes={classes}"]))
+    words = ("Car", "bus", "tractor", "rickshaw", "pedestrian", "rider", "cow")
+    found = {word: roles.class_of(word) for word in words if roles.role_of(word) == "vehicle"}
+    assert found == learnt
+
+
+def test_until_keeps_the_frames_up_to_the_last() -> None:
+    rows = [row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (1, 2, 4) for id_ in (1, 2)]
+    part = checked_video(rows).until(3)
+    assert {index: len(tracks) for index, tracks in part.frames.items()} == {1: 2, 2: 2}
+    assert part.length == 3
+
+
+NOW = 1_777_618_800.0
+
+
+@pytest.mark.parametrize(
+    ("times", "rate", "expected"),
+    [
+        ({0: 0.0, 2: 0.08}, None, {0: 0.0, 2: 0.08}),
+        ({0: 1.4, 2: 1.48}, None, {0: 0.0, 2: 0.08}),
+        ({0: -0.12, 2: -0.04}, None, {0: 0.0, 2: 0.08}),
+        ({37: 3601.48, 38: 3601.52}, None, {37: 1.48, 38: 1.52}),
+        ({10: NOW + 1, 12: NOW + 1.2}, 10.0, {10: 1.0, 12: 1.2}),
+        ({1500: 63.0, 1501: 63.04}, None, {1500: 63.0, 1501: 63.04}),  # the rate varies
+        ({25: 1.0}, 25.0, {25: 1.0}),
+    ],
+)
+def test_times_count_from_the_first_frame_of_the_video(
+    times: dict[int, float], rate: float | None, expected: dict[int, float]
+) -> None:
+    begin = datetime(2026, 5, 1, 7, tzinfo=UTC)
+    saved = SavedTracks({}, times=times, begin=begin, video=SourceVideo("a.ts", 9, 9, rate=rate))
+    counted = saved.from_first_frame()
+    assert counted.times == pytest.approx(expected, abs=1e-5)
+    assert counted.begin is not None
+    moments = [
+        [(tracks.begin + timedelta(seconds=time)).timestamp() for time in tracks.times.values()]
+        for tracks in (saved, counted)
+        if tracks.begin
+    ]
+    assert moments[0] == pytest.approx(moments[1]), "the clock times are the same"
+
+
+FILE = Path("gt.txt")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (row(7, -1, 1, 0, 0, 5, 5), "the frame comes before the video's first"),
+        (row(7, 1, -1, 0, 0, 5, 5), "id -1 is negative"),
+        (row(7, 1, -2, 0, 0, 5, 5, ignored=True), "id -2 is negative"),
+        (row(7, 1, 3, 9, 9, 5, 5), "id 3 occurs twice in the same frame"),
+        (row(7, 1, 1, 0, 0, 0, 5), "the box has no area: 0 wide, 5 high"),
+        (row(7, 1, 1, 0, 0, -5, -5), "the box has no area: -5 wide, -5 high"),
+        (row(7, 1, 1, 0, 0, 1e-200, 1e-200), "the box has no area"),
+    ],
+)
+def test_an_impossible_row_is_refused_with_its_line(wrong: Row, message: str) -> None:
+    rows = [row(1, 1, 3, 0, 0, 5, 5), row(2, 2, 3, 0, 0, 5, 5), wrong]
+    with pytest.raises(TruthError) as caught:
+        checked_video(rows, FILE)
+    assert str(caught.value).startswith(f"gt.txt:7: {message}")
+
+
+def test_a_frame_may_have_many_ignore_regions_without_an_id() -> None:
+    rows = [row(line, 1, NO_ID, 0, 0, 5, 5, ignored=True) for line in (1, 2, 3)]
+    assert len(checked_video(rows, FILE).frames[1]) == 3
+
+
+def test_words_for_a_class_become_ours_and_others_stay() -> None:
+    labels = ("Van", "lorry", "tractor", None)
+    rows = [row(1, 0, number, 0, 0, 9, 9, name=label) for number, label in enumerate(labels)]
+    names = [track.class_name for track in next(iter(video_of(rows))).tracks]
+    assert names == ["car", "truck", "tractor", None]
+
+
+def test_a_rate_gives_times_to_frames_without() -> None:
+    saved = video_of((row(1, 5, 1, 0, 0, 9, 9), row(1, 6, 1, 0, 0, 9, 9)), times={6: 0.5})
+    assert not saved.has_times
+    assert math.isnan(next(iter(saved)).time)
+    timed = saved.at_rate(10)
+    assert timed.has_times
+    assert [frame.time for frame in timed] == [0.5, 0.5]
+
+
+def test_frames_ascend_where_a_set_of_their_numbers_does_not() -> None:
+    assert [frame.index for frame in SavedTracks({}, (7, 8))] == [7, 8]
+
+
+def test_blank_lines_count() -> None:
+    assert list(numbered_lines(Path("a"), b"a\r\n\r\n b \nc")) == [(1, "a"), (3, "b"), (4, "c")]
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", bytes(range(256))])
+def test_a_file_that_is_not_text_is_refused(content: bytes) -> None:
+    with pytest.raises(TruthError, match="gt: is not a text file"):
+        list(numbered_lines(Path("gt"), content))
+
+
+def test_a_byte_order_mark_is_not_part_of_the_text() -> None:
+    assert list(numbered_lines(Path("gt"), b"\xef\xbb\xbf1,2")) == [(1, "1,2")]

@@ -1,4 +1,4 @@
-"""The video reader: parts of a file, damaged files, files that are no videos, and frame times."""
+"""The video reader: parts, damage, clocks that restart, streams without times."""
 
 import struct
 from collections.abc import Callable
@@ -14,11 +14,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from clips import ODD, read_number, write_clip
+from clips import ODD, joined, read_number, sound_of, write_clip
+from vdet.config.schema import InputSettings, OutputSettings
 from vdet.errors import VideoError
+from vdet.media import Frame
+from vdet.media.demux import Damage, Decoder
 from vdet.media.frame import Coding, ColorTags
 from vdet.media.images import Orientation
 from vdet.media.reader import VideoReader, next_time
+from vdet.media.writer import VideoWriter
 
 Image = NDArray[np.uint8]
 Warnings = Callable[[], list[str]]
@@ -364,3 +368,256 @@ def test_fragments_end_where_their_last_frame_does(
         assert [read_number(frame.image) for frame in reader] == list(range(10 * first, 60))
         assert reader.length == seconds
     assert warnings() == []
+
+
+OPEN = {"g": "10", "bf": "2", "x264-params": "open-gop=1"}
+FRAGMENTS = {"movflags": "+frag_keyframe+empty_moov"}
+MPEG = {"codec": "mpeg2video", "options": {"g": "10", "bf": "2", "q": "2"}}
+VP9 = {"codec": "libvpx-vp9", "options": {"deadline": "realtime", "g": "10"}}
+LATE = {"begin": Fraction(3600)}
+UNEVEN = [Fraction(number * number, 250) for number in range(60)]
+CLIPS: dict[str, tuple[str, dict[str, Any]]] = {
+    "mp4": ("mp4", {}),
+    "mp4 with sound": ("mp4", {"sounds": ["aac"]}),
+    "mov, open gops": ("mov", {"options": OPEN}),
+    "fragments, open gops": ("mp4", {"options": OPEN, **FRAGMENTS}),
+    "uneven times": ("mp4", {"times": UNEVEN}),
+    "no edit list": ("mp4", {"muxing": {"use_editlist": "0"}}),
+    "mkv, open gops": ("mkv", {"options": OPEN, "sounds": ["aac"], **LATE}),
+    "transport stream, open gops": ("ts", {"options": OPEN, "sounds": ["aac"]}),
+    "program stream": ("vob", {"sounds": ["mp2"], **MPEG}),
+    "vp9": ("webm", VP9),
+}
+NOT_SURE: dict[str, tuple[str, dict[str, Any]]] = {
+    "no times": ("h264", {}),
+    "avi": ("avi", {}),
+    "hidden frames": ("webm", {"codec": "libvpx", "options": {"auto-alt-ref": "1", "g": "10"}}),
+    "intra refresh": (
+        "mp4",
+        {"options": {"g": "20", "bf": "0", "x264-params": "intra-refresh=1"}},
+    ),
+    "intra refresh, b-frames": (
+        "mkv",
+        {"options": {"g": "20", "x264-params": "intra-refresh=1"}},
+    ),
+    "interlaced": ("mp4", {"options": {"g": "10", "flags": "+ildct+ilme", "x264-params": "tff=1"}}),
+}
+
+
+@pytest.fixture
+def decoded(monkeypatch: pytest.MonkeyPatch) -> list[None]:
+    """Has an item for each picture that was decoded."""
+    calls: list[None] = []
+    receive = Damage.receive
+
+    def counted(damage: Damage, picture: av.VideoFrame) -> bool:
+        calls.append(None)
+        return receive(damage, picture)
+
+    monkeypatch.setattr(Damage, "receive", counted)
+    return calls
+
+
+def read_from(path: Path, start: Fraction | None = None) -> list[Frame]:
+    with VideoReader(path, start=start) as reader:
+        return list(reader)
+
+
+def assert_part(part: list[Frame], whole: list[Frame], start: Fraction) -> None:
+    expected = [frame for frame in whole if frame.time - whole[0].time >= start]
+    assert [frame.index for frame in part] == [frame.index for frame in expected]
+    assert [frame.time for frame in part] == [frame.time for frame in expected]
+    for one, other in zip(part, expected, strict=True):
+        np.testing.assert_array_equal(one.image, other.image)
+
+
+@pytest.mark.parametrize("name", CLIPS)
+def test_a_part_is_that_of_the_whole_and_the_frames_before_are_not_decoded(
+    name: str, tmp_path: Path, decoded: list[None]
+) -> None:
+    suffix, spec = CLIPS[name]
+    path = write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec)
+    whole = read_from(path)
+    for number in (1, 9, 10, 11, 38, 40, 55, 59):
+        start = whole[number].time - whole[0].time
+        decoded.clear()
+        assert_part(read_from(path, start), whole, start)
+        assert len(decoded) < 60 - number + 35
+
+
+@pytest.mark.parametrize("name", NOT_SURE)
+def test_where_frames_cannot_be_counted_all_are_decoded(
+    name: str, tmp_path: Path, decoded: list[None]
+) -> None:
+    suffix, spec = NOT_SURE[name]
+    path = write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec)
+    whole = read_from(path)
+    decoded.clear()
+    start = Fraction(2)
+    assert_part(read_from(path, start), whole, start)
+    assert len(decoded) >= 60
+
+
+@pytest.mark.parametrize("name", [*CLIPS, *NOT_SURE])
+def test_a_copy_must_begin_at_a_key_frame_that_is_shown(name: str, tmp_path: Path) -> None:
+    suffix, spec = (CLIPS | NOT_SURE)[name]
+    decoder = Decoder(write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec), None)
+    has_times = suffix != "h264"
+    assert decoder.shows_key_frame() == (has_times and "intra refresh" not in name)
+    decoder.demuxer.close()
+
+
+def test_a_start_after_a_clock_that_restarts(tmp_path: Path) -> None:
+    clip = write_clip(tmp_path / "clip.ts", sounds=["aac"], **GOPS)
+    path = joined(tmp_path / "joined.ts", clip, clip)
+    assert_part(read_from(path, Fraction(4)), read_from(path), Fraction(4))
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_a_start_beyond_the_end_gives_no_frame_and_the_length(suffix: str, tmp_path: Path) -> None:
+    path = write_clip(tmp_path / f"clip.{suffix}", **GOPS)
+    with VideoReader(path, start=Fraction(10**13)) as reader:
+        assert list(reader) == []
+        assert reader.length == pytest.approx(Fraction(60, 25), abs=0.002)
+
+
+SLOW = Fraction(25, 2)
+CODECS = {"h264": "libx264", "hevc": "libx265", "m2v": "mpeg2video", "h263": "h263"}
+"""Streams that state their rate."""
+RATES = {"m2v": Fraction(24), "h263": Fraction(30_000, 1001)}  # no others, or few
+
+
+def read_raw(
+    path: Path, rate: float | None = None
+) -> tuple[list[Fraction], Fraction, Fraction | None]:
+    """Return the times of the frames, the rate, and the length."""
+    with VideoReader(path, settings=InputSettings(frame_rate=rate)) as reader:
+        times = [frame.time for frame in reader]
+        return times, reader.info.rate, reader.length
+
+
+@pytest.mark.parametrize("suffix", CODECS)
+def test_the_rate_is_that_of_the_stream(
+    suffix: str, tmp_path: Path, warnings: Callable[[], list[str]]
+) -> None:
+    rate = RATES.get(suffix, SLOW)
+    spec: dict[str, Any] = {"codec": CODECS[suffix], "rate": rate, "size": (176, 144)}
+    path = write_clip(tmp_path / f"clip.{suffix}", count=30, **spec)
+    assert read_raw(path) == ([number / rate for number in range(30)], rate, 30 / rate)
+    assert read_raw(path, 10)[1] == 10
+    assert warnings() == []
+    clip = write_clip(tmp_path / "clip.mp4", count=2)
+    with pytest.raises(VideoError, match="has a frame rate of its own; remove input"):
+        read_raw(clip, 10)
+
+
+@pytest.mark.parametrize(
+    ("given", "rate"), [(None, Fraction(25)), (12.5, SLOW), (50, Fraction(50))]
+)
+@pytest.mark.parametrize(
+    ("suffix", "spec"),
+    [
+        ("mjpeg", {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": SLOW}),
+        *(
+            ("h264", {"codec": "libx264", "rate": unit})
+            for unit in map(Fraction, ("600", "1000", "1/25"))
+        ),
+    ],
+)
+def test_a_stream_without_a_usual_rate_has_that_of_the_settings(
+    suffix: str,
+    spec: dict[str, Any],
+    given: float | None,
+    rate: Fraction,
+    tmp_path: Path,
+    warnings: Callable[[], list[str]],
+) -> None:
+    path = write_clip(tmp_path / f"clip.{suffix}", count=30, **spec)
+    assert read_raw(path, given) == ([number / rate for number in range(30)], rate, 30 / rate)
+    assumed = f"{path}: 25 frames per second are assumed; set input.frame_rate"
+    assert warnings() == [assumed] * (given is None)
+
+
+KINDS: dict[str, dict[str, Any]] = {
+    "ts": {"codec": "libx264", "sounds": ["aac"], "options": {"g": "10", "bf": "2"}},
+    "vob": {"codec": "mpeg2video", "sounds": ["mp2"], "options": {"g": "10", "bf": "2"}},
+}
+COUNT = 30
+PAUSE = Fraction(1, 5)  # at most, from part to part
+
+
+def copy(source: Path) -> tuple[list[int], list[Fraction], Path]:
+    """Copy a clip; return the numbers of its frames, their times, and the copy."""
+    target = source.with_name("copy.mkv")
+    with (
+        VideoReader(source) as reader,
+        VideoWriter(target, reader.info, OutputSettings(preset="ultrafast")) as writer,
+    ):
+        frames = list(reader)
+        for frame in frames:
+            writer.write(frame)
+        assert reader.damaged == 0
+    numbers = [read_number(frame.image) for frame in frames]
+    return numbers, [frame.time - frames[0].time for frame in frames], target
+
+
+def sound(path: Path) -> list[tuple[Fraction, bytes]]:
+    """Return the packets; those of AAC in a transport stream have a header."""
+    header = 7 if path.suffix == ".ts" else 0
+    return [(time, data[header:]) for time, data in sound_of(path)]
+
+
+def part(folder: Path, kind: str, begin: int = 0) -> Path:
+    name = f"{begin}.{kind}"
+    return write_clip(folder / name, count=COUNT, begin=Fraction(begin), **KINDS[kind])
+
+
+@pytest.mark.parametrize(
+    ("kind", "begins"),
+    [
+        ("ts", [0, 0]),
+        ("vob", [0, 0]),
+        ("ts", [0, 100, 0]),  # goes forth and back
+        ("ts", [1000, 0]),  # FFmpeg takes it for a clock of 33 bits that overflows
+    ],
+)
+def test_all_frames_and_all_sound_follow_one_another(
+    kind: str, begins: list[int], *, tmp_path: Path, warnings: Warnings
+) -> None:
+    parts = [part(tmp_path, kind, begin) for begin in begins]
+    source = joined(tmp_path / f"joined.{kind}", *parts)
+    numbers, times, target = copy(source)
+    assert numbers == list(range(COUNT)) * len(parts)
+    steps = [later - earlier for earlier, later in pairwise(times)]
+    within = [step for number, step in enumerate(steps, start=1) if number % COUNT]
+    assert set(within) == {PERIOD}
+    assert all(PERIOD <= step <= PAUSE for step in steps)
+
+    heard = sound(target)
+    expected = [data for part in parts for _, data in sound(part)]
+    first = expected.index(heard[0][1])  # mkv holds none from before the first frame
+    assert first <= 2
+    assert [data for _, data in heard] == expected[first:]
+    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(heard)]
+    assert all(0 < gap <= PAUSE for gap in gaps)
+    count = len(parts) - 1
+    assert warnings() == [f"{source}: its clock restarts {count}×; the parts follow one another"]
+
+
+def test_picture_and_sound_of_each_part_stay_in_step(tmp_path: Path) -> None:
+    clip = part(tmp_path, "ts")
+    _, times, target = copy(joined(tmp_path / "joined.ts", clip, clip))
+    alone = sound(clip)
+    second = sound(target)[-len(alone) :]
+    assert float(second[0][0] - times[COUNT]) == pytest.approx(float(alone[0][0]), abs=0.002)
+
+
+def test_a_pause_of_the_pictures_is_kept_while_the_sound_goes_on(
+    tmp_path: Path, warnings: Warnings
+) -> None:
+    times = [Fraction(index, 25) + (12 if index >= 20 else 0) for index in range(COUNT)]
+    clip = write_clip(tmp_path / "pause.ts", times=times, **KINDS["ts"])
+    numbers, found, _ = copy(clip)
+    assert numbers == list(range(COUNT))
+    assert found == times
+    assert not any("clock" in warning for warning in warnings())

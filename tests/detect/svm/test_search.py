@@ -1,13 +1,31 @@
-from dataclasses import replace
+"""The dense search: it finds what the search of single patches finds, in planes and in BGR."""
 
+from dataclasses import replace
+from fractions import Fraction
+
+import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from codings import in_any_coding
+from detect.svm.engine_comparison import (
+    SEED_FEATURES,
+    EngineResults,
+    cars,
+    compare,
+    fitted,
+    grid_of,
+    log_odds,
+    road,
+)
 from seed import SEED
 from vdet.boxes import Image
 from vdet.config.kinds import (
     FeatureSettings,
     HistogramSettings,
+    HogSettings,
     PerspectiveSettings,
     SearchSettings,
     WindowSettings,
@@ -15,10 +33,12 @@ from vdet.config.kinds import (
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmDetector
-from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.windows import Windows, window_grids
+from vdet.detect.svm.model import BoxRegression, FeatureExtractor, LinearModel, resize, split
+from vdet.detect.svm.search import DenseSearch, FramePyramid
+from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, WindowGrid, Windows, window_grids
 from vdet.errors import FrameSizeError
-from vdet.media import Picture
+from vdet.media import Picture, Planes
+from vdet.media.frame import Coding
 
 Sides = tuple[float, float, float, float]
 
@@ -126,3 +146,146 @@ class TestVehicles:
 def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int) -> None:
     with pytest.raises(FrameSizeError, match=rf"no search window fits .* {width}×{height} pixels"):
         SvmDetector(model_of(COLOUR), SEED.svm, width, height)
+
+
+HORIZON = 0.57
+"""Row of the horizon of the drawn road."""
+
+
+def both_forms(image: Image, coding: Coding) -> tuple[Picture, Picture]:
+    """Return an image as planes, and these as BGR."""
+    picture = Picture(Planes.of_image(image, coding))
+    return picture, Picture(picture.image)
+
+
+@in_any_coding
+def test_windows_have_about_the_same_probabilities(coding: Coding) -> None:
+    search = SvmDetector(fitted(FeatureSettings()), SvmSettings(), 1280, 720, horizon=HORIZON)
+    ours, expected = (
+        log_odds(search.search(picture, 0)[0].probabilities)
+        for picture in both_forms(road(), coding)
+    )
+    assert (expected > 0).any(), "nothing is found: decisions cannot differ"
+    assert np.corrcoef(ours, expected)[0, 1] > 0.97
+    assert np.mean((ours > 0) == (expected > 0)) > 0.95
+
+
+WHOLE = FeatureSettings(halved=())
+PICTURE = np.random.default_rng(0).integers(0, 256, (97, 131, 3), dtype=np.uint8)
+
+
+def spans(length: int) -> st.SearchStrategy[slice]:
+    pairs = st.tuples(st.integers(0, length - 1), st.integers(1, length))
+    return pairs.map(lambda pair: slice(pair[0], min(length, sum(pair))))
+
+
+@given(
+    st.sampled_from([0, 1, 2, 3, 4, 8, 16]),
+    st.sampled_from([0, 1, 2, 3, 4, 8, 16]),
+    st.sampled_from([1, 2, 4, 8]),
+    st.sampled_from([2, 3, 4]),
+)
+def test_a_cut_of_halvable_size_is_halved_from_odd_and_even_pixels(
+    top: int, left: int, factor: int, side: int
+) -> None:
+    rows = slice(top, top + factor * side * 2)
+    columns = slice(left, left + factor * side * 3)
+    cut = FramePyramid(Picture(PICTURE), WHOLE).cut(FrameStrip(rows, columns, side * 3, side * 2))
+    means = PICTURE[rows, columns].reshape(side * 2, factor, side * 3, factor, 3).mean(axis=(1, 3))
+    expected = np.array(split(means.round().astype(np.uint8), WHOLE), int)
+    np.testing.assert_allclose(cut, expected, atol=2 + np.log2(factor) / 2)  # each halving rounds
+
+
+MARGIN = 48
+BEYOND = np.pad(PICTURE, ((0, 0), (MARGIN, MARGIN), (0, 0)), mode="edge")
+
+
+@given(spans(97), spans(131 + 2 * MARGIN), st.integers(0, 96), st.integers(1, 40))
+def test_beyond_the_sides_the_outermost_columns_repeat(
+    rows: slice, columns: slice, top: int, side: int
+) -> None:
+    frame = FramePyramid(Picture(PICTURE), WHOLE, min(top, rows.start), margin=MARGIN)
+    expected = BEYOND[rows, columns]
+    of_frame = slice(columns.start - MARGIN, columns.stop - MARGIN)
+    height, width, _ = expected.shape
+    window = frame.cut(FrameStrip(rows, of_frame, width, height))
+    np.testing.assert_array_equal(window, split(expected, WHOLE))
+    cut = frame.cut(FrameStrip(rows, of_frame, side, side))
+    as_in_training = split(resize(expected, side, side), WHOLE)
+    np.testing.assert_array_equal(cut, as_in_training)
+
+
+FEATURES = FeatureSettings(patch=64, halved=(), hog=HogSettings(cell=8))
+GRIDS = [(64, 8), (64, 16), (64, 12), (128, 24), (128, 25), (80, 13)]
+"""Sizes and steps: whole cells, one and a half, and other distances."""
+
+
+def texture(side: int) -> Image:
+    coarse = np.random.default_rng(3).integers(0, 256, (8, 8, 3), dtype=np.uint8)
+    return np.asarray(cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def texture_finder() -> LinearModel:
+    """Return a model for which the texture is the most probable vehicle."""
+    vector = FeatureExtractor(FEATURES).describe(texture(64))
+    vector[FEATURES.hog_length :] = 0
+    weights = vector[np.newaxis] / np.linalg.norm(vector) ** 2
+    one = np.ones(1, np.float32)
+    return LinearModel(FEATURES, weights, biases=-0.7 * one, slopes=-8 * one, offsets=0 * one)
+
+
+@pytest.mark.parametrize(("size", "step"), GRIDS)
+def test_the_sides_in_a_hit_are_those_of_its_hog_features(size: int, step: int) -> None:
+    """The regression repeats the model, so the sides of a hit give its decision value."""
+    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
+    model = texture_finder()
+    weights = np.repeat(model.weights[:, : FEATURES.hog_length], 4, axis=0)
+    regression = BoxRegression(weights, np.repeat(model.biases, 4))
+    search = DenseSearch(replace(model, box_regression=regression), grid)
+    frame = FramePyramid(Picture(texture(400)), FEATURES)
+    minimum = float(np.median(search.search(frame, 1)[0]))
+    probabilities, sides = search.search(frame, minimum)
+    hits = probabilities >= minimum
+    assert sides.shape == (35, 4)
+    assert sides.dtype == np.float32
+    for side in sides[hits].T:
+        expected = model.to_probabilities(side[:, np.newaxis])
+        np.testing.assert_allclose(probabilities[hits], expected, atol=1e-5)
+    assert len(np.unique(sides[hits].round(4))) > 8
+    np.testing.assert_array_equal(sides[~hits], np.tile(WINDOW_SIDES, (17, 1)))
+
+
+SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
+PAIRS = {
+    "a cell": grid_of(64, overlap=0.875),
+    "two cells": grid_of(96, overlap=0.75),
+    "three cells": grid_of(64, overlap=0.625),
+    "one and a half": grid_of(64, overlap=0.8),
+    "half pixels": grid_of(128, overlap=0.8),
+    "third pixels": grid_of(96, overlap=0.8),
+    "enlarged": grid_of(48, overlap=0.8),
+    "enlarged, third pixels": grid_of(48, overlap=0.85),
+}
+"""Row of the horizon of the drawn road."""
+
+FEW = 0.92
+"""Minimum fraction of equal decisions in a small grid, where a few near 0.5 are some percent."""
+
+
+def assert_agree(results: EngineResults, same: float = 0.97) -> None:
+    assert (results.patch > 0).any(), "nothing is found: decisions cannot differ"
+    assert results.correlation >= 0.99
+    assert results.same >= same
+
+
+@pytest.mark.parametrize(("name", "members"), [("seed", 3), ("default", 1), ("default", 3)])
+def test_the_engines_agree_on_a_drawn_road(name: str, members: int) -> None:
+    model = fitted(SHIPPED[name].features, members)
+    grids = window_grids(SHIPPED[name], model.features, 1280, 720, horizon=HORIZON)
+    assert_agree(compare(model, grids, road()))
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+def test_the_engines_agree_for_any_step(kind: str) -> None:
+    model = fitted(SEED_FEATURES, members=2)
+    assert_agree(compare(model, [PAIRS[kind]], cars()), same=FEW)

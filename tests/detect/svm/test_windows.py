@@ -1,13 +1,19 @@
+"""Where windows lie: in bands, by the perspective, and by the horizon of drawn roads."""
+
+from dataclasses import replace
 from fractions import Fraction
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from vdet.boxes import Int32Array
-from vdet.config.kinds import WindowSettings
-from vdet.detect.svm.windows import WindowGrid, Windows, band_grid
+from vdet.boxes import Image, Int32Array
+from vdet.config.kinds import FeatureSettings, PerspectiveSettings, WindowSettings
+from vdet.detect.svm.windows import WindowGrid, Windows, band_grid, find_horizon, perspective_grids
+from vdet.synthetic.render import frames
+from vdet.synthetic.scene import PinholeCamera, demo_scene, empty_road
 
 ROWS = 2000  # of a frame that is higher than all bands here
 
@@ -81,3 +87,161 @@ def test_hits_are_the_windows_of_at_least_the_probability_in_order() -> None:
     assert found.vehicles.tolist() == [[0.5, 1.5, 2.5, 3.5], [8.5, 9.5, 10.5, 11.5]]
     assert len(windows) == 4
     assert len(found) == 2
+
+
+FEATURES = FeatureSettings()
+SIZES = PerspectiveSettings().sizes
+FRAMES = [(1280, 720), (960, 540), (1242, 375), (1920, 1080), (854, 480), (96, 64)]
+
+
+def laid(
+    width: int = 1280,
+    height: int = 720,
+    horizon: float = 0.55,
+    features: FeatureSettings = FEATURES,
+    **changes: object,
+) -> list[WindowGrid]:
+    settings = PerspectiveSettings.model_validate(changes)
+    return perspective_grids(settings, features, width, height, horizon=horizon)
+
+
+def rows_of(grid: WindowGrid) -> tuple[int, int]:
+    """Return the first row of the highest windows, and the first below the lowest."""
+    boxes = grid.boxes
+    return int(boxes[0, 1]), int(boxes[-1, 1] + boxes[-1, 3])
+
+
+@pytest.mark.parametrize("horizon", [0.35, 0.5, 0.6])
+def test_windows_end_below_the_horizon_by_0_6_to_1_1_of_their_sides(horizon: float) -> None:
+    grids = laid(height=2000, horizon=horizon)
+    assert len(grids) == len(SIZES)
+    for grid in grids:
+        rounding = max(1, grid.size / FEATURES.patch) / 2
+        top, bottom = rows_of(grid)
+        first, last = top + grid.size - horizon * 2000, bottom - horizon * 2000
+        assert abs(first - 0.6 * grid.size) <= rounding
+        assert abs(last - 1.1 * grid.size) <= rounding + grid.step / 2
+
+
+def test_windows_reach_beyond_both_sides_by_whole_steps_of_at_most_0_7() -> None:
+    for grid in laid():
+        x = grid.boxes[:, 0]
+        beyond = 5 / 8 * grid.size
+        assert x.min() == -beyond
+        over = int(x.max()) + grid.size - 1280
+        assert beyond - grid.step < over <= beyond
+
+
+@pytest.mark.parametrize(("width", "height"), FRAMES)
+@pytest.mark.parametrize("horizon", [0.4, 0.57, 0.61])
+def test_windows_lie_at_whole_pixels_of_every_halved_frame(
+    width: int, height: int, horizon: float
+) -> None:
+    for grid in laid(width, height, horizon):
+        halved = grid.size
+        divisor = 1
+        while halved > 2 * FEATURES.patch:
+            divisor *= 2
+            halved = grid.size // divisor
+        lengths = (grid.size, grid.left, grid.top, grid.step)
+        assert [Fraction(length) % divisor for length in lengths] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "sizes"),
+    [
+        (1280, 720, [64, 80, 112, 160, 224, 320, 384]),
+        (960, 540, [48, 64, 80, 128, 160, 256]),
+        (1242, 375, [32, 40, 56, 80, 112, 160, 192]),
+        (1920, 1080, [96, 128, 160, 256, 320, 512]),
+        (96, 64, [8, 16, 24, 32]),
+    ],
+)
+def test_the_default_sets_in_frames_of_other_shapes(
+    width: int, height: int, sizes: list[int]
+) -> None:
+    grids = laid(width, height)
+    assert [grid.size for grid in grids] == sizes
+    for grid in grids:
+        top, bottom = rows_of(grid)
+        assert 0 <= top < bottom <= height
+        assert min(grid.columns, grid.rows) >= 1
+
+
+@given(st.integers(1, 400), st.integers(1, 400), st.floats(0, 1), st.floats(0.01, 1))
+def test_windows_lie_inside_the_rows_of_any_frame(
+    width: int, height: int, horizon: float, size: float
+) -> None:
+    for grid in laid(width, height, horizon, sizes=(size,)):
+        boxes = grid.boxes
+        assert len(boxes) == len(grid) > 0
+        assert boxes[:, 1].min() >= 0
+        assert (boxes[:, 1] + boxes[:, 3]).max() <= height
+
+
+STEP = 0.01  # between the rows that get votes
+RNG = np.random.default_rng(0)
+
+
+def road(horizon: float, *, curvature: float = 0, lane: int = 0, lanes: int = 3) -> list[Image]:
+    """Draw three frames of an empty road."""
+    camera = PinholeCamera(640, 360, 600, horizon * 360, 1.3, curvature)
+    scene = empty_road(np.random.default_rng(7), camera, lane=lane, lanes=lanes, seed=7)
+    return [frame.image for frame in frames(replace(scene, frames=3))]
+
+
+@pytest.mark.parametrize("horizon", [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65])
+def test_the_lines_of_a_straight_road_meet_at_the_horizon(horizon: float) -> None:
+    assert find_horizon(road(horizon)) == pytest.approx(horizon, abs=STEP)
+
+
+@pytest.mark.parametrize("curvature", [-1 / 600, 1 / 1000])
+@pytest.mark.parametrize(("lane", "lanes"), [(0, 2), (1, 2), (1, 3)])
+def test_the_road_may_bend_and_the_camera_be_in_any_lane(
+    curvature: float, lane: int, lanes: int
+) -> None:
+    images = road(0.5, curvature=curvature, lane=lane, lanes=lanes)
+    assert find_horizon(images) == pytest.approx(0.5, abs=2 * STEP)
+
+
+def test_the_horizon_is_found_behind_traffic() -> None:
+    scene = replace(demo_scene(1, width=640, height=360), frames=5)
+    found = find_horizon([frame.image for frame in frames(scene)])
+    assert found == pytest.approx(scene.camera.horizon / 360, abs=2 * STEP)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((180, 320, 3), np.uint8),
+        np.full((180, 320, 3), 255, np.uint8),
+        RNG.integers(0, 256, (180, 320, 3), dtype=np.uint8),
+        np.repeat(RNG.integers(0, 256, (1, 320, 3), dtype=np.uint8), 180, axis=0),
+        np.zeros((1, 1, 3), np.uint8),
+        np.zeros((1, 500, 3), np.uint8),
+    ],
+    ids=["black", "white", "noise", "upright lines", "a pixel", "a row"],
+)
+def test_without_lines_there_is_no_horizon(image: Image) -> None:
+    assert find_horizon([image]) is None
+
+
+def fan(*slopes: float) -> Image:
+    """Draw lines of these slopes from where they meet in the middle of row 162, down."""
+    image = np.full((360, 640, 3), 90, np.uint8)
+    for slope in slopes:
+        for span in ((60, 110), (130, 180)):
+            start, end = (
+                (round(320 + np.sign(slope) * x), round(162 + abs(slope) * x)) for x in span
+            )
+            cv2.line(image, start, end, (240, 240, 240), 3, cv2.LINE_AA)
+    return image
+
+
+RIGHT = (0.3, 0.5, 0.7, 0.9)
+LEFT = tuple(-slope for slope in RIGHT)
+
+
+def test_lines_from_both_sides_are_needed() -> None:
+    assert find_horizon([fan(*LEFT, *RIGHT)]) == pytest.approx(0.45, abs=STEP)
+    assert find_horizon([fan(*RIGHT)]) is find_horizon([fan(*LEFT)]) is None

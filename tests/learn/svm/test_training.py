@@ -1,20 +1,44 @@
+"""The linear model is fitted, calibrated, and measured."""
+
 import json
+import logging
 import shutil
+import tracemalloc
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+from sklearn.calibration import CalibratedClassifierCV
+from sklearn.model_selection import StratifiedKFold
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import LinearSVC
 
 import vdet
-from vdet.boxes import Image
+from vdet.boxes import BoolArray, Float32Array, Image
 from vdet.config.kinds import FeatureSettings, HistogramSettings, HogSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
-from vdet.detect.svm.model import FeatureExtractor, load_model, save_model
+from vdet.detect.svm.model import (
+    BoxRegression,
+    FeatureExtractor,
+    LinearModel,
+    load_model,
+    save_model,
+)
 from vdet.errors import DataError
-from vdet.learn.svm.patches import LabelledVectors, PatchFile, extract, find_patches, hold_out
-from vdet.learn.svm.training import train
+from vdet.learn.svm.patches import (
+    LabelledVectors,
+    PatchFile,
+    RowNumbers,
+    extract,
+    find_patches,
+    hold_out,
+)
+from vdet.learn.svm.training import Classification, TrainingMetrics, fit_sides, train
+from vdet.learn.svm.training import fit as fit_rows
 from vdet.media.images import read_image
 from writing import write_image
 
@@ -179,3 +203,196 @@ def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(
     assert (found.patches, found.accuracy) == (2 + 4 + 3 + 2, 10 / 11)
     assert found.groups["non-vehicles/sky"] == 0.5
     assert steps[:2] == [("describing patches", 57), ("fitting the classifier", None)]
+
+
+FEATURES = FeatureSettings()
+
+
+def clouds(count: int = 300) -> tuple[Float32Array, npt.NDArray[np.bool_]]:
+    """Return two overlapping clouds of features of very different scale, one of them constant."""
+    rng = np.random.default_rng(0)
+    vehicle = rng.random(count) < 0.4
+    vectors = rng.normal(size=(count, 24)) + 0.6 * vehicle[:, np.newaxis]
+    vectors = (vectors + 2) * np.logspace(-2, 3, 24)
+    vectors[:, 5] = 7
+    return vectors.astype(np.float32), vehicle
+
+
+def labelled(vectors: Float32Array, vehicle: BoolArray, origins: RowNumbers) -> LabelledVectors:
+    files = [PatchFile(Path(), f"{row}.png", "some", True) for row in range(origins.max() + 1)]
+    sides = np.zeros((len(vectors), 4), np.float32)
+    return LabelledVectors(vectors, vehicle, sides, origins, files)
+
+
+def fit(
+    vectors: Float32Array,
+    vehicle: BoolArray,
+    origins: RowNumbers | None = None,
+    penalty: float = 0.01,
+) -> LinearModel:
+    """Fit to copies of vectors; without origins, all rows are patches."""
+    training = SvmTrainingSettings(C=penalty)
+    if origins is None:
+        origins = np.arange(len(vectors))
+    rows = labelled(vectors.copy(), vehicle, origins)
+    return fit_rows(
+        rows, Settings(detector=SvmSettings(features=FEATURES), train=TrainSettings(svm=training))
+    )
+
+
+def test_the_folded_model_gives_the_probabilities_of_scikit_learn() -> None:
+    vectors, vehicle = clouds()
+    model = fit(vectors, vehicle)
+    svm = CalibratedClassifierCV(
+        LinearSVC(C=0.01, random_state=0),
+        cv=StratifiedKFold(3, shuffle=True, random_state=0),
+        ensemble=False,
+    )
+    reference = make_pipeline(StandardScaler(), svm).fit(vectors, vehicle)
+    expected = reference.predict_proba(vectors)[:, 1]
+    assert expected.std() > 0.2
+    np.testing.assert_allclose(model.probabilities(vectors), expected, atol=1e-4)
+    assert model.weights.shape == (1, 24)
+    assert model.biases.shape == model.slopes.shape == model.offsets.shape == (1,)
+    assert model.features == FEATURES
+    kinds = {a.dtype for a in (model.weights, model.biases, model.slopes, model.offsets)}
+    assert kinds == {np.dtype(np.float32)}
+
+
+@pytest.mark.parametrize(("vehicles", "others"), [(2, 30), (30, 0)])
+def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, others: int) -> None:
+    vehicle = np.array([True] * vehicles + [False] * others, bool)
+    vectors = np.ones((len(vehicle), 24), np.float32)
+    message = rf"a class has {min(vehicles, others)} training patches, must be at least 3; add more"
+    with pytest.raises(DataError, match=message):
+        fit(vectors, vehicle)
+
+
+@pytest.mark.parametrize("most", [1, 1000])
+def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    monkeypatch.setattr("vdet.learn.svm.training.MAX_ITERATIONS", most)
+    with caplog.at_level(logging.WARNING, "vdet"):
+        fit(*clouds(), penalty=1e6 if most == 1 else 0.01)
+    warning = "the SVM has not converged; lower train.svm.C"
+    assert (warning in caplog.text) is (most == 1)
+
+
+def test_a_patch_and_the_samples_made_of_it_are_in_the_same_fold() -> None:
+    """Otherwise the SVM knows a sample like the patch, and the score of the patch is too good."""
+    rng = np.random.default_rng(0)
+    vehicle = np.arange(90) % 2 == 0
+    noise = rng.normal(size=(90, 24)).astype(np.float32)  # can only be learned by heart
+    twice = np.concatenate([noise, noise])
+    origins = np.tile(np.arange(90), 2)
+    honest = fit(twice, np.tile(vehicle, 2), origins, penalty=10.0)
+    leaking = fit(twice, np.tile(vehicle, 2), penalty=10.0)
+    np.testing.assert_allclose(honest.weights, leaking.weights, atol=1e-3)
+    assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
+
+
+def peak_memory(call: Callable[[], object]) -> int:
+    """Return the bytes that `call` had at once."""
+    tracemalloc.start()
+    call()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return peak
+
+
+def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vdet.learn.svm.training.MAX_ITERATIONS", 5)
+    rng = np.random.default_rng(0)
+    origins = np.concatenate([np.arange(3000), rng.integers(0, 3000, 4500)])
+    vectors = rng.normal(size=(7500, 768)).astype(np.float32)
+    vehicle = (vectors[:, 0] > 0)[origins]
+    rows = labelled(vectors, vehicle, origins)
+    settings = Settings(detector=SvmSettings())
+    peak = peak_memory(lambda: fit_rows(rows.of(np.ones(3000, bool)), settings))
+    assert peak < 1.5 * vectors.nbytes
+
+
+TRUE = BoxRegression(
+    np.random.default_rng(1).normal(size=(4, 12)).astype(np.float32),
+    np.array([-0.5, -0.4, 0.5, 0.3], np.float32),
+)
+
+
+def scene(count: int = 400) -> tuple[Float32Array, Float32Array]:
+    """Return features of different spread, and the sides that `TRUE` computes from them."""
+    rng = np.random.default_rng(0)
+    hogs = (rng.random((count, 12)) * np.linspace(0.05, 1, 12)).astype(np.float32)
+    return hogs, TRUE.sides(hogs)
+
+
+def fit_columns(hogs: Float32Array, sides: Float32Array, penalty: float) -> BoxRegression:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("vdet.learn.svm.training.PENALTY", penalty)
+        return fit_sides(hogs.copy(), sides)
+
+
+def test_a_linear_map_is_found() -> None:
+    found = fit_columns(*scene(), penalty=1e-6)
+    np.testing.assert_allclose(found.weights, TRUE.weights, atol=0.01)
+    np.testing.assert_allclose(found.biases, TRUE.biases, atol=0.01)
+    assert found.weights.dtype == found.biases.dtype == np.float32
+
+
+def test_the_rows_in_which_a_side_is_unknown_do_not_count_for_it() -> None:
+    hogs, sides = scene()
+    sides[100:200, 0] = sides[:30, 2] = sides[50:80, 3] = np.nan
+    sides[:, 1] = np.nan
+    found = fit_columns(hogs, sides, penalty=1e-6)
+    for side in (0, 2, 3):
+        np.testing.assert_allclose(found.weights[side], TRUE.weights[side], atol=0.01)
+    assert found.sides(hogs)[:, 1].tolist() == [0] * 400
+
+
+@pytest.mark.parametrize("count", [400, 8])
+def test_the_penalty_is_per_patch_so_that_a_set_given_twice_gives_the_same(count: int) -> None:
+    """A set of 8 patches has fewer rows than features; given twice, it has more."""
+    hogs, sides = scene(count)
+    once = fit_columns(hogs, sides, penalty=0.5)
+    twice = fit_columns(np.tile(hogs, (2, 1)), np.tile(sides, (2, 1)), penalty=0.5)
+    np.testing.assert_allclose(once.weights, twice.weights, atol=1e-4)
+
+
+def test_a_feature_that_hardly_varies_gets_a_small_weight() -> None:
+    hogs, sides = scene()
+    hogs[:, 0] = 1 + 1e-4 * np.random.default_rng(4).normal(size=len(hogs))
+    assert abs(fit_columns(hogs, sides, penalty=0.1).weights[:, 0]).max() < 0.1
+
+
+TEST = Classification.of(
+    np.array([True, True, True, False, False]),
+    np.array([True, True, False, True, False]),
+    np.array(["a", "a", "b", "c", "c"]),
+)
+METRICS = TrainingMetrics({"a": 60, "boxes/mined": 7}, 170, 1.0, TEST, box_error=0.0431)
+
+
+def test_patches_are_compared_by_class_and_by_group() -> None:
+    assert (
+        Classification(5, 0.6, 2 / 3, 2 / 3, [[2, 1], [1, 1]], {"a": 1.0, "b": 0.0, "c": 0.5})
+        == TEST
+    )
+    none = np.zeros(2, bool)
+    without = Classification.of(none, none, np.array(["a", "a"]))
+    assert (without.accuracy, without.precision, without.recall) == (1, None, None)
+
+
+def test_the_text_has_the_accuracies_the_confusion_and_the_groups() -> None:
+    rows = [line.split() for line in METRICS.lines()]
+    for words in (
+        *("a 60 patches", "boxes/mined 7 patches", "train accuracy 1.0000 (170 samples)"),
+        *("patches tested: 5", "accuracy 0.6000", "precision 0.6667", "recall 0.6667"),
+        *("is vehicle 2 1", "is non-vehicle 1 1", "c 0.5000"),
+        "sides of vehicles' boxes: mean error 0.043 of a patch's side",
+    ):
+        assert rows.count(words.split()) == 1
+
+
+def test_the_text_says_what_a_model_of_patches_alone_lacks() -> None:
+    words = "no patches from vdet mine: in video, such a model finds far fewer vehicles"
+    assert words in replace(METRICS, box_error=None).lines()
