@@ -62,7 +62,7 @@ def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: 
     note.unlink()
     assert names(tmp_path / "out") == ["day/a.csv", "day/a.mp4"]
     states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
-    assert [output.state for output in record.outputs] == states
+    assert [(output.bytes, output.changed) for output in record.outputs] == states
     assert {output.digest for output in record.outputs} == {result_digest(job)}
 
 

@@ -62,11 +62,6 @@ class Written:
     digest: str
     summary: Any = None
 
-    @property
-    def state(self) -> tuple[int, int]:
-        """Its size and time, as in `output_state`."""
-        return self.bytes, self.changed
-
 
 @dataclass(frozen=True, slots=True)
 class ManifestRecord:
@@ -280,7 +275,7 @@ def allow_replacing(run: Run, written: WrittenByPath) -> Run:
     """
     for output in run.outputs:
         state, versions = output_state(output), written.get(os.path.realpath(output.path), ())
-        if state and state[0] and state not in {version.state for version in versions}:
+        if state and state[0] and state not in {(item.bytes, item.changed) for item in versions}:
             raise BatchError(f"{output.path}: has changed since vdet wrote it", field="overwrite")
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 

@@ -50,30 +50,25 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
             yield Tile(drawn, image.labelled.path.name, f"{scores.misses} missed, {alarms}")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _UnpairedBox:
-    """A box with a mistake, and its best IoU with any box of the other side.
+_Mistake = tuple[ComparedFrame, Float64Array, float]
+"""A box without a pair in a frame, and its best IoU with any box of the other side.
 
-    Near 0: no such box. Below 0.5: a poor fit. Above: the other box is matched with another one.
-    """
-
-    frame: ComparedFrame
-    box: Float64Array
-    overlap: float
+Near 0: no such box. Below 0.5: a poor fit. Above: the other box is matched with another one.
+"""
 
 
-def _unpaired_boxes(comparison: Comparison) -> dict[str, list[_UnpairedBox]]:
+def _mistakes(comparison: Comparison) -> dict[str, list[_Mistake]]:
     """Return the boxes of each missed vehicle and of each false alarm, by its name."""
-    boxes: dict[str, list[_UnpairedBox]] = defaultdict(list)
+    boxes: dict[str, list[_Mistake]] = defaultdict(list)
     for frame in comparison.frames:
         overlaps = frame.iou.max(axis=1, initial=0)
         for row in np.setdiff1d(np.arange(len(frame.vehicles)), frame.rows).tolist():
             name = f"missed vehicle {comparison.vehicle_ids[frame.vehicles[row]]}"
-            boxes[name].append(_UnpairedBox(frame, frame.vehicle_boxes[row], overlaps[row]))
+            boxes[name].append((frame, frame.vehicle_boxes[row], overlaps[row]))
         overlaps = frame.iou.max(axis=0, initial=0)
         for row in np.setdiff1d(np.arange(len(frame.tracks)), frame.columns).tolist():
             name = f"false alarm, track {comparison.track_ids[frame.tracks[row]]}"
-            boxes[name].append(_UnpairedBox(frame, frame.track_boxes[row], overlaps[row]))
+            boxes[name].append((frame, frame.track_boxes[row], overlaps[row]))
     return boxes
 
 
@@ -82,20 +77,18 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
 
     The video is decoded again. Raises `VideoError`.
     """
-    mistakes = sorted(_unpaired_boxes(comparison).items(), key=lambda item: -len(item[1]))
-    middles = {name: boxes[(len(boxes) - 1) // 2] for name, boxes in mistakes[:_MAX_CROPS]}
-    numbers = {middle.frame.number for middle in middles.values()}
+    mistakes = sorted(_mistakes(comparison).items(), key=lambda item: -len(item[1]))[:_MAX_CROPS]
+    middles = [boxes[(len(boxes) - 1) // 2] for _, boxes in mistakes]
+    numbers = {frame.number for frame, _, _ in middles}
     tolerant = InputSettings(max_damaged=1)  # it was accepted when it was scored
     with VideoReader(video, frames=max(numbers, default=0) + 1, settings=tolerant) as reader:
         images = {frame.index: frame.image for frame in reader if frame.index in numbers}
-    for name, boxes in mistakes[:_MAX_CROPS]:
-        middle = middles[name]
-        image = images.get(middle.frame.number)
-        if image is not None:
-            overlap = sum(box.overlap for box in boxes) / len(boxes)
+    for (name, boxes), (frame, box, _) in zip(mistakes, middles, strict=True):
+        if frame.number in images:
+            overlap = sum(overlap for _, _, overlap in boxes) / len(boxes)
             caption = f"{quantity(len(boxes), 'frame')}, best IoU {overlap:.2f}"
-            tile = _cut_around(middle.box, _with_boxes(image, middle.frame))
-            yield Tile(tile, f"{name}, frame {middle.frame.number + 1}", caption)
+            tile = _cut_around(box, _with_boxes(images[frame.number], frame))
+            yield Tile(tile, f"{name}, frame {frame.number + 1}", caption)
 
 
 def _cut_around(sides: Float64Array, image: Image) -> Image:
