@@ -254,19 +254,17 @@ class VideoWriter:
                     self._audio = AudioCopy(self._info.path, self._container, begin)
             since = frame.time - self._origin
             last, self._last = self._last, max(self._last + 1, round(since / self._time_base))
-            self._check_pause((self._last - last) * self._time_base)
+            pause = (self._last - last) * self._time_base
+            # FFmpeg writes no coarser ticks than 20,000 a second.
+            is_too_long = pause * max(self._time_base.denominator, 20_000) >= 2**31
+            if is_too_long and self._container.format.name != "matroska":
+                raise OutputError(f"{self._name}: cannot hold a pause of {int(pause)} s; use .mkv")
             picture = frame.picture.to_encode(self._info.coding)
             picture.pts, picture.time_base = self._last, self._time_base
             picture.duration = round(self._period / self._time_base)
             self._container.mux(self._stream.encode(picture))
             if self._audio:
                 self._audio.copy(since)
-
-    def _check_pause(self, seconds: Fraction) -> None:
-        """Raise `OutputError` for a pause between two frames that is too long for mp4."""
-        ticks = seconds * max(self._time_base.denominator, 20_000)  # FFmpeg writes no coarser ones
-        if ticks >= 2**31 and self._container.format.name != "matroska":
-            raise OutputError(f"{self._name}: cannot hold a pause of {int(seconds)} s; use .mkv")
 
     def __enter__(self) -> Self:
         return self
