@@ -6,7 +6,7 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -52,110 +52,82 @@ def main() -> None:
     options.json.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
 
+ROWS = (
+    ("patch / dense, windows of seed.yaml", "seed patch", "seed dense", "≥ 2", "4"),
+    ("detectMultiScale / dense", "detectMultiScale", "svm dense", "≥ 3", "8"),
+    ("dense / decoding to planes", "svm dense beside decoding", "decoding", "≤ 1.2", "0.8"),
+    ("network / decoding to planes", "network beside decoding", "decoding", "–", "–"),
+    (
+        "network / svm.yaml, a frame",
+        "network detection",
+        "svm detection",
+        "≤ 1.8",
+        "1.4",
+    ),
+    ("detect-video / plain transcode", "detect", "transcode", "≤ 1.15", "1.05"),
+    ("detect-video -c svm / plain transcode", "detect with svm", "transcode", "≤ 1.25", "–"),
+    ("detect-video --lanes --camera / without", "detect with lanes", "detect", "≤ 1.25", "–"),
+    (
+        "detect-video with regions, counts, records and trails / without",
+        *("detect with answers", "detect", "≤ 1.03", "–"),
+    ),
+    (
+        "detect-video --flows with a clock / without",
+        "detect with flows",
+        "detect",
+        "≤ 1.03",
+        "–",
+    ),
+    ("length / detect-video --no-video", "played", "detect only", "≥ 7", "10"),
+    ("length / detect-video --no-video -c svm", "played", "detect only with svm", "–", "–"),
+    ("dense search of a frame, 1080p / 720p", "1080", "720", "≤ 1.6", "–"),
+    ("dense search of a frame, 2160p / 720p", "2160", "720", "≤ 4", "–"),
+    (f"vdet --help / python -c '{IMPORTS}'", "help", "imports", "≤ 0.8", "0.5"),
+    ("detect-image, one image / the same", "picture", "imports", "≤ 2.5", "2.0"),
+    (
+        "one second of video / PyAV alone, processor time",
+        *("busy second", "busy plain second", "≤ 2.0", "1.5"),
+    ),
+)
+"""Ratios: the name, the two tasks whose times are divided, the bound, and the aim."""
+
+
 def measure_all(folder: Path, rounds: int) -> list[Measurement]:
     path = find_video(folder)
     svm, seed = shipped_svm("svm"), shipped_svm("seed")
     pictures = read_pictures(path)
     print(f"measuring on {path.name} …", file=sys.stderr)
     limit_library_threads()
-    searched = search_times(path, pictures, svm, seed, rounds)
-    by_height = times_by_height(pictures, svm, rounds)
-    ran = run_times(path, folder, rounds)
-    started = start_times(path, folder, rounds)
+    of_frames = search_times(path, pictures, svm, seed, rounds)
+    of_frames |= times_by_height(pictures, svm, rounds)
+    starts = start_times(path, folder, rounds)
+    times = {
+        **{name: (seconds, 0.0) for name, seconds in of_frames.items()},
+        **run_times(path, folder, rounds),
+        **starts,
+        **{f"busy {name}": (busy, 0.0) for name, (_, busy) in starts.items()},
+        "played": (seconds_of_video(path), 0.0),
+    }
     hour = seconds_of_count(folder, ".csv")
-    memory = [peak_memory(path, folder, *extra) for extra in ((), ("--frames", "40"))]
-    whole, first = memory
+    whole, first = (peak_memory(path, folder, *extra) for extra in ((), ("--frames", "40")))
+    parts = f"{whole:.0f} and {first:.0f} MB"
+    name = "peak memory, whole video"
     return [
-        *_search_rows(searched),
-        *_run_rows(ran, seconds_of_video(path)),
-        *_size_rows(by_height),
-        *_start_rows(started),
+        *(_ratio(times, row) for row in ROWS),
         Measurement("vdet count, tracks of an hour", hour, "≤ 20", "8", "1.2 million boxes"),
-        Measurement("peak memory, whole video", whole, "≤ 260", "200", "MB"),
-        Measurement(
-            "peak memory, whole video / its first 40 frames", whole / first, "≤ 1.15", "–",
-            f"{whole:.0f} and {first:.0f} MB",
-        ),
-    ]  # fmt: skip
+        Measurement(name, whole, "≤ 260", "200", "MB"),
+        Measurement(f"{name} / its first 40 frames", whole / first, "≤ 1.15", "–", parts),
+    ]
 
 
-def _search_rows(times: dict[str, float]) -> list[Measurement]:
-    def row(name: str, over: str, under: str, must: str, aim: str = "–") -> Measurement:
-        detail = f"{1000 * times[over]:.1f} and {1000 * times[under]:.1f} ms a frame"
-        return Measurement(name, times[over] / times[under], must, aim, detail)
-
-    dense, decoding = "svm dense", "decoding"
-    return [
-        row("patch / dense, windows of seed.yaml", "seed patch", "seed dense", "≥ 2", "4"),
-        row("detectMultiScale / dense", "detectMultiScale", dense, "≥ 3", "8"),
-        row("dense / decoding to planes", f"{dense} beside decoding", decoding, "≤ 1.2", "0.8"),
-        row("network / decoding to planes", "network beside decoding", decoding, "–"),
-        row(
-            "network / svm.yaml, detection of a frame",
-            "network detection", "svm detection", "≤ 1.8", "1.4",
-        ),
-    ]  # fmt: skip
-
-
-Times = Mapping[str, tuple[float, float]]
-"""Seconds of wall time and of processor time of each task."""
-
-
-def _row_of(times: Times) -> Callable[..., Measurement]:
-    """Return a function that makes a row of the ratio of two tasks."""
-
-    def row(name: str, over: str, under: str, must: str, aim: str = "–") -> Measurement:
-        (wall, busy), (other_wall, other_busy) = times[over], times[under]
-        detail = f"{wall:.2f} and {other_wall:.2f} s"
-        if other_busy and busy:
-            detail += (
-                f"; processor time: {busy / other_busy:.2f}, {busy:.2f} and {other_busy:.2f} s"
-            )
-        return Measurement(name, wall / other_wall, must, aim, detail)
-
-    return row
-
-
-def _start_rows(times: Times) -> list[Measurement]:
-    row, busy_row = _row_of(times), _row_of({name: (busy, 0) for name, (_, busy) in times.items()})
-    return [
-        row(f"vdet --help / python -c '{IMPORTS}'", "help", "imports", "≤ 0.8", "0.5"),
-        row("detect-image, one image / the same", "picture", "imports", "≤ 2.5", "2.0"),
-        busy_row(
-            "one second of video / PyAV alone, processor time",
-            "second", "plain second", "≤ 2.0", "1.5",
-        ),
-    ]  # fmt: skip
-
-
-def _run_rows(times: Times, played: float) -> list[Measurement]:
-    row = _row_of({**times, "played": (played, 0.0)})
-    return [
-        row("detect-video / plain transcode", "detect", "transcode", "≤ 1.15", "1.05"),
-        row("detect-video -c svm / plain transcode", "detect with svm", "transcode", "≤ 1.25"),
-        row("detect-video --lanes --camera / without", "detect with lanes", "detect", "≤ 1.25"),
-        row(
-            "detect-video with regions, counts, records and trails / without",
-            "detect with answers", "detect", "≤ 1.03",
-        ),
-        row(
-            "detect-video --flows --begin --ground / without",
-            "detect with flows", "detect", "≤ 1.03",
-        ),
-        row("length / detect-video --no-video", "played", "detect only", "≥ 7", "10"),
-        row("length / detect-video --no-video -c svm", "played", "detect only with svm", "–"),
-    ]  # fmt: skip
-
-
-def _size_rows(times: dict[int, float]) -> list[Measurement]:
-    bounds = {1080: "≤ 1.6", 2160: "≤ 4"}
-    return [
-        Measurement(
-            f"dense search of a frame, {height}p / 720p", times[height] / times[720], must, "–",
-            f"{1000 * times[height]:.1f} and {1000 * times[720]:.1f} ms",
-        )
-        for height, must in bounds.items()
-    ]  # fmt: skip
+def _ratio(times: Mapping[str, tuple[float, float]], row: tuple[str, ...]) -> Measurement:
+    """Return the ratio of two tasks; `times` are seconds of wall time and of processor time."""
+    name, over, under, must, aim = row
+    (wall, busy), (other_wall, other_busy) = times[over], times[under]
+    detail = f"{1000 * wall:.1f} and {1000 * other_wall:.1f} ms"
+    if other_busy and busy:
+        detail += f"; processor time: {busy / other_busy:.2f}, {busy:.2f} and {other_busy:.2f} s"
+    return Measurement(name, wall / other_wall, must, aim, detail)
 
 
 def _table(rows: Sequence[Measurement]) -> list[str]:

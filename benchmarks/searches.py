@@ -112,7 +112,7 @@ def _decoding(
     }
 
 
-def times_by_height(pictures: Sequence[Picture], svm: SvmModel, rounds: int) -> dict[int, float]:
+def times_by_height(pictures: Sequence[Picture], svm: SvmModel, rounds: int) -> dict[str, float]:
     """Return the dense search's seconds a frame for frames of several heights."""
     images = [picture.image for picture in pictures[:3]]
     tasks: dict[str, Task] = {}
@@ -122,4 +122,4 @@ def times_by_height(pictures: Sequence[Picture], svm: SvmModel, rounds: int) -> 
         planes = [Picture(Planes.of_image(image, Coding())) for image in scaled]
         tasks[str(height)] = _search(svm, planes)
     times = measure(tasks, rounds)
-    return {int(name): seconds / len(images) for name, seconds in times.items()}
+    return {name: seconds / len(images) for name, seconds in times.items()}
