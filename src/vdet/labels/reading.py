@@ -143,9 +143,9 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
         frames = {}
         for index, tracks in saved.frames.items():
             vehicles = [
-                item if 0 <= item.score <= 1 else replace(item, score=min(max(item.score, 0), 1))
-                for item in tracks
-                if not (item.ignored or item.class_name in regions)
+                x if 0 <= x.score <= 1 else replace(x, score=min(max(x.score, 0.0), 1.0))
+                for x in tracks
+                if not (x.ignored or x.class_name in regions)
             ]
             if vehicles:
                 frames[index] = vehicles
