@@ -8,6 +8,7 @@ these is found if it has a trace; every other trace is false.
 """
 
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -39,29 +40,17 @@ class Line:
     strip: Sequence[Image]
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Number of crossings, of those taken away, of those that have a trace, and of false traces."""
+Outcome = Counter[str]
+"""Number of crossings, of those taken away, of those that have a trace, and of false traces."""
 
-    crossings: int = 0
-    missed: int = 0
-    found: int = 0
-    false: int = 0
 
-    def __add__(self, other: "Outcome") -> "Outcome":
-        return Outcome(
-            crossings=self.crossings + other.crossings,
-            missed=self.missed + other.missed,
-            found=self.found + other.found,
-            false=self.false + other.false,
-        )
-
-    def __str__(self) -> str:
-        found, false = self.found / max(1, self.missed), 100 * self.false / max(1, self.crossings)
-        return (
-            f"{self.found} of {self.missed} missed have a trace ({found:.1%}); {self.false} false, "
-            f"{false:.1f} per 100 of {self.crossings}"
-        )
+def _text(outcome: Outcome) -> str:
+    found = outcome["found"] / max(1, outcome["missed"])
+    false = 100 * outcome["false"] / max(1, outcome["crossings"])
+    return (
+        f"{outcome['found']} of {outcome['missed']} missed have a trace ({found:.1%}); "
+        f"{outcome['false']} false, {false:.1f} per 100 of {outcome['crossings']}"
+    )
 
 
 def lines_of(scene: PoleScene, truth: Sequence[FrameTracks]) -> list[Line]:
@@ -99,7 +88,8 @@ def measured(line: Line, truth: Sequence[FrameTracks], missed: set[int]) -> Outc
         ):
             left.remove(same)
     found = len(gone) - len(left)
-    return Outcome(len(line.passages), len(gone), found, len(traces) - found)
+    false = len(traces) - found
+    return Counter(crossings=len(line.passages), missed=len(gone), found=found, false=false)
 
 
 def _shows(trace: Trace, passage: BandPassage) -> bool:
@@ -121,9 +111,9 @@ def main() -> None:
             missed = set(np.random.default_rng(seed).choice(ids, count, replace=False).tolist())
             for line in lines:
                 outcome += measured(line, truth, missed)
-        print(f"{scene.name}: {outcome}", flush=True)
+        print(f"{scene.name}: {_text(outcome)}", flush=True)
         total += outcome
-    print(f"all: {total}")
+    print(f"all: {_text(total)}")
 
 
 if __name__ == "__main__":
