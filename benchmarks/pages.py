@@ -27,7 +27,7 @@ from vdet.boxes import Box
 from vdet.media import VideoInfo
 from vdet.pages.batch import write_index
 from vdet.pages.render import jpeg_uri
-from vdet.pages.video import VideoPage
+from vdet.pages.video import VideoPage, longest
 from vdet.track.track import State
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import Speeds
@@ -110,7 +110,7 @@ def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
                 motion="drove",
             )
         )
-    thumbnails = {record.id: (record.first, jpeg_uri(STILL)) for record in records}
+    thumbnails = {record.id: jpeg_uri(STILL) for record in longest(records)}
     info = VideoInfo(Path("hour.mp4"), WIDTH, HEIGHT, Fraction(25), Fraction(1, 25))
     still = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     page = VideoPage(

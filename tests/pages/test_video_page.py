@@ -49,7 +49,7 @@ def page(
     return VideoPage(
         video=replace(video_info(WIDTH, HEIGHT), path=source), frames=52,
         spans=[(0.0, end - float(1 / video_info(WIDTH, HEIGHT).rate))],
-        records=TWO, thumbnails={1: (1.25, jpeg_uri(STILL))}, poster=STILL, player=player,
+        records=TWO, thumbnails={1: jpeg_uri(STILL)}, poster=STILL, player=player,
         settings="output:\n  crf: 25\n",
     )  # fmt: skip
 
@@ -188,7 +188,7 @@ class TestVideoPage:
             page(source=Path("clips") / NASTY, player=player_of(NASTY)),
             records=records(frame(0, bus), frame(1, bus)),
             settings=NASTY,
-            thumbnails={1: (0.0, jpeg_uri(STILL))},
+            thumbnails={1: jpeg_uri(STILL)},
         )
         plain, nasty = seen(page()), seen(made)
         assert {tag for tag, _ in nasty.seen} == {tag for tag, _ in plain.seen}

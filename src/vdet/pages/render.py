@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 import cv2
+import numpy as np
 from markupsafe import Markup, escape
 
 from vdet.boxes import Image
@@ -23,6 +24,7 @@ PAGE_NAME, REVIEW_NAME = "page.html", "review.html"
 """File name of a page in its folder."""
 TEMPLATES = Path(__file__).parent / "templates"
 _QUALITY = 84  # of JPEG pictures
+_SMALL_SIDE, _SMALL_BYTES = 96, 2048
 
 
 def render(template: str, **values: Any) -> str:
@@ -53,6 +55,22 @@ def jpeg_uri(image: Image, max_side: int | None = None) -> str:
         image = shrunk(image, max_side / max(image.shape[:2]))
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
+
+
+def thumbnail(image: Image) -> bytes:
+    """Return a BGR uint8 image as WebP of at most 96 pixels and 2 KB."""
+    small = shrunk(image, _SMALL_SIDE / max(image.shape[:2]))
+    data = np.empty(0, np.uint8)
+    for quality in (70, 50, 30, 10):
+        _, data = cv2.imencode(".webp", small, [cv2.IMWRITE_WEBP_QUALITY, quality])
+        if data.size <= _SMALL_BYTES:
+            break
+    return data.tobytes()
+
+
+def webp_uri(data: bytes) -> str:
+    """Return a WebP image as a data URI."""
+    return "data:image/webp;base64," + base64.b64encode(data).decode("ascii")
 
 
 def link_to(path: Path, folder: Path) -> str:

@@ -63,8 +63,7 @@ class VideoPage:
     spans
         The parts with video, from the first to the last frame, seconds as in the tracks.
     thumbnails
-        By id, the time of a frame in seconds, and the image of the vehicle as a data URI. A vehicle
-        may have none.
+        By id, the image of the vehicle as a data URI. A vehicle may have none.
     poster
         The frame with the most vehicles, BGR uint8; None without frames.
     settings
@@ -76,7 +75,7 @@ class VideoPage:
     clock
         Start time of the video; None if unknown.
     pictures
-        By id, the address of the image of a vehicle relative to the page, if the run writes one.
+        By id, the address of the image of a vehicle relative to the page.
     findings
         Reasons to doubt the results.
     clips
@@ -91,7 +90,7 @@ class VideoPage:
     frames: int
     spans: Sequence[Span]
     records: Sequence[VehicleRecord]
-    thumbnails: Mapping[int, tuple[float, str]]
+    thumbnails: Mapping[int, str]
     poster: Image | None
     player: Player | None
     settings: str
@@ -166,11 +165,9 @@ class VideoPage:
 
     def html(self) -> str:
         """Return the page; it loads only the video."""
-        longest = sorted(self.records, key=lambda record: -record.seconds)[:_MAX_VEHICLES]
-        shown = sorted(longest, key=lambda record: (record.first, record.id))
+        shown = longest(self.records)
         x = charts.time_axis(self.start, self.end, self.to_clock)
-        ids = {record.id for record in shown}
-        rows = self._rows({key: uri for key, (_, uri) in self.thumbnails.items() if key in ids})
+        rows = self._rows(self.thumbnails)
         page, start = ("", self.player.start) if self.player else (None, 0.0)
         return render(
             "video.html",
@@ -263,6 +260,12 @@ class VideoPage:
             return None
         height, width = self.poster.shape[:2]
         return with_marks(self.poster, path_marks(self.records, (width, height)))
+
+
+def longest(records: Sequence[VehicleRecord]) -> list[VehicleRecord]:
+    """Return the vehicles to show one by one: those shown longest, in the order of their times."""
+    first = sorted(records, key=lambda record: -record.seconds)[:_MAX_VEHICLES]
+    return sorted(first, key=lambda record: (record.first, record.id))
 
 
 def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding]) -> list[TimelineBar]:

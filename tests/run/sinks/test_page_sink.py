@@ -16,14 +16,14 @@ from running import names
 from vdet.boxes import Image
 from vdet.config.scene import RegionSettings
 from vdet.config.schema import OutputSettings
-from vdet.media.images import decode_image
+from vdet.media.images import decode_image, read_image
+from vdet.pages.render import thumbnail as small_picture
 from vdet.run.sinks import Output
 from vdet.run.video import Run
 from writing import write_image
 
 
 def page_of(folder: Path) -> Elements:
-    assert names(folder) == ["page.html"]
     return Elements((folder / "page.html").read_text(encoding="utf-8"))
 
 
@@ -48,8 +48,14 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     assert facts["seconds"] == pytest.approx(COUNT / 25)
     (table,) = re.findall('id="vehicles">(.*?)<', (tmp_path / "page" / "page.html").read_text())
     (thumbnail,) = json.loads(table)["picture"]
-    blue, _, red = picture(thumbnail).reshape(-1, 3).mean(axis=0)
-    assert red > blue + 50
+    assert names(tmp_path / "page") == ["page.html", "vehicle-1.webp"]
+    file = tmp_path / "page" / facts["rows"][0]["picture"]
+    assert file.stat().st_size <= 2048
+    for shown in (picture(thumbnail), read_image(file)):
+        blue, _, red = shown.reshape(-1, 3).mean(axis=0)
+        assert red > blue + 50
+    noise = np.random.default_rng(0).integers(0, 256, (400, 300, 3), np.uint8)
+    assert len(small_picture(noise)) <= 2048
 
 
 def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path: Path) -> None:

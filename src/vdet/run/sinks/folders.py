@@ -19,8 +19,8 @@ from vdet.media.demux import is_pipe
 from vdet.media.images import encode_image, is_image_name
 from vdet.media.writer import copied_suffix, copy_part, encode_part, is_marked
 from vdet.pages.batch import write_index, write_reviews
-from vdet.pages.render import PAGE_NAME, REVIEW_NAME, jpeg_uri, link_to
-from vdet.pages.video import Player, VideoPage
+from vdet.pages.render import PAGE_NAME, REVIEW_NAME, link_to, thumbnail, webp_uri
+from vdet.pages.video import Player, VideoPage, longest
 from vdet.regions import Regions
 from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS
@@ -36,7 +36,7 @@ _BOXES = "boxes"
 _GREY = 160, 160, 160
 _CROP_NAME = re.compile(r"vehicle-\d{4,}(-[\w-]+)?-at--?\d+\.\d{3}s\.jpg")
 _GAP = 1.0  # minimum seconds between two frames that the page calls a gap
-_THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
+_PICTURE_NAME = re.compile(r"vehicle-\d+\.webp")
 
 
 class StagesSink(BaseSink):
@@ -117,9 +117,7 @@ class CropSink(BaseSink):
         for vehicle in self.traffic.vehicles:
             if vehicle.id in self._written:
                 time, path = self._written.pop(vehicle.id)
-                name = _crop_name(vehicle, time)
-                path.rename(self._folder / name)
-                self.context.crop_files[vehicle.id] = self.path / name
+                path.rename(self._folder / _crop_name(vehicle, time))
         for _, path in self._written.values():
             path.unlink()
 
@@ -154,17 +152,19 @@ class PageSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        self._file = context.files.stage_folder(path) / PAGE_NAME
-        self._thumbnails: dict[int, tuple[float, str]] = {}
+        self._folder = context.files.stage_folder(path, _is_picture)
+        self._pictures: dict[int, Path] = {}
         self._spans: list[Span] = []
         self._frames = 0
 
     def finish(self) -> None:
         """Write the page."""
         self._keep(self.context.crops.end())
+        for number in self._pictures.keys() - {vehicle.id for vehicle in self.traffic.vehicles}:
+            self._pictures.pop(number).unlink()
         page = self._page()
         self.summary = {"page": f"{self.path.name}/{PAGE_NAME}", **page.summary}
-        write_text(self._file, page.html())
+        write_text(self._folder / PAGE_NAME, page.html())
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
@@ -176,7 +176,8 @@ class PageSink(BaseSink):
 
     def _keep(self, crops: list[Crop]) -> None:
         for crop in crops:
-            self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
+            self._pictures[crop.id] = self._folder / f"vehicle-{crop.id}.webp"
+            self._pictures[crop.id].write_bytes(thumbnail(crop.image))
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.traffic
@@ -186,23 +187,23 @@ class PageSink(BaseSink):
             frames=self._frames,
             spans=self._spans or [(0.0, 0.0)],
             records=traffic.vehicles,
-            thumbnails=self._thumbnails,
+            thumbnails={
+                record.id: webp_uri(self._pictures[record.id].read_bytes())
+                for record in longest(traffic.vehicles)
+                if record.id in self._pictures
+            },
             poster=self.context.poster.image(traffic.vehicles),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
             survey=self.context.survey,
             interval=settings.traffic.seconds or 60,
             clock=traffic.clock,
-            pictures=self._addresses(self.context.crop_files),
+            pictures={number: path.name for number, path in self._pictures.items()},
             findings=findings_in(self.context.facts).items,
-            clips=self._addresses(self.context.clip_files),
+            clips={n: link_to(path, self.path) for n, path in self.context.clip_files.items()},
             review=link_to(review / REVIEW_NAME, self.path) if review else "",
             index=_index(self, "page"),
         )
-
-    def _addresses(self, files: Mapping[int, Path]) -> dict[int, str]:
-        """Return the addresses of files by the id of a vehicle."""
-        return {number: link_to(path, self.path) for number, path in files.items()}
 
     def _player(self) -> Player | None:
         """Return the video that this run writes, else the source if it is a video file."""
@@ -214,6 +215,10 @@ class PageSink(BaseSink):
         if drawn:
             path, start = drawn, self._spans[0][0] if self._spans else start
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
+
+
+def _is_picture(path: Path) -> bool:
+    return _PICTURE_NAME.fullmatch(path.name) is not None
 
 
 def _index(sink: BaseSink, name: str) -> str:

@@ -68,8 +68,8 @@ class SinkContext:
     facts
         Results of steps about the whole video, by name; empty before sinks finish. Sinks that
         finish first may add to them.
-    crop_files, clip_files
-        The image and the clip of a vehicle by its id, once the sinks that write them have finished.
+    clip_files
+        The clip of a vehicle by its id, once the sink that writes it has finished.
     places
         For single images: their paths below the input folders.
     stage_images
@@ -89,7 +89,6 @@ class SinkContext:
     traffic: "LiveTraffic | None" = None
     corrections: "Corrections | None" = None
     facts: dict[str, Fact] = field(default_factory=dict)
-    crop_files: dict[int, Path] = field(default_factory=dict)
     clip_files: dict[int, Path] = field(default_factory=dict)
     places: Mapping[Path, Path] = field(default_factory=dict)
     stage_images: StageImages = lambda *_: {}
