@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vdet.review.estimate import CountError, draw_spans, estimate
+from vdet.review.estimate import draw_spans, estimate
 from vdet.traffic.counts import ALL, Estimate, VehicleGroup
 
 CLASSES = {"car": 0.85, "truck": 0.1, "bus": 0.05}
@@ -100,16 +100,20 @@ def simulate(situation: Situation, seed: int) -> dict[VehicleGroup, Result]:
     missing = np.where(rng.random(minutes) < situation.bursts, 0.5, missing)
     groups = [ALL, *(VehicleGroup(str(line), "in") for line in range(len(situation.lines)))]
     groups += [VehicleGroup(class_name=name) for name in names]
-    counted, true = ({group: [0] * minutes for group in groups} for _ in range(2))
-    errors: list[CountError] = []
+    numbers = {group: np.zeros((3, minutes), np.int64) for group in groups}
+    true = dict.fromkeys(groups, 0)
 
-    def count(
-        table: dict[VehicleGroup, list[int]], minute: int, line: int, kind: int
-    ) -> tuple[VehicleGroup, ...]:
-        found = ALL, VehicleGroup(str(line), "in"), VehicleGroup(class_name=names[kind])
-        for group in found:
-            table[group][minute] += 1
-        return found
+    def add(minute: int, line: int, counted: int | None, right: int | None) -> None:
+        """Add a vehicle of a class, by its number; None: it was not counted, or did not pass."""
+        before, after = (
+            () if kind is None
+            else (ALL, VehicleGroup(str(line), "in"), VehicleGroup(class_name=names[kind]))
+            for kind in (counted, right)
+        )  # fmt: skip
+        for group in {*before, *after}:
+            was, is_now = group in before, group in after
+            numbers[group][:, minute] += was, is_now > was, was > is_now
+            true[group] += is_now
 
     shares = list(CLASSES.values())
     for minute in range(minutes):
@@ -117,20 +121,16 @@ def simulate(situation: Situation, seed: int) -> dict[VehicleGroup, Result]:
             traffic = part * rates[minute]
             false = traffic * situation.false * wrong[minute] + situation.ghosts
             for kind in rng.choice(3, rng.poisson(false), p=shares):
-                found = count(counted, minute, line, kind)
-                errors.append(CountError(minute, found, ()))
+                add(minute, line, kind, None)
             for kind in rng.choice(3, rng.poisson(traffic), p=shares):
-                right = count(true, minute, line, kind)
                 if rng.random() < worse * missing[minute]:
-                    errors.append(CountError(minute, (), right))
+                    add(minute, line, None, kind)
                     continue
                 is_renamed = rng.random() < situation.renamed.get(names[kind], 0)
-                shown = count(counted, minute, line, (kind + 1) % 3 if is_renamed else kind)
-                if is_renamed:
-                    errors.append(CountError(minute, shown, right))
-    order = draw_spans(counted[ALL], seed)
-    estimates = estimate(counted, errors, order[: situation.checked], order)
-    return {item.group: Result(item, sum(true[item.group])) for item in estimates}
+                add(minute, line, (kind + 1) % 3 if is_renamed else kind, kind)
+    order = draw_spans(numbers[ALL][0], seed)
+    estimates = estimate(numbers, order[: situation.checked], order)
+    return {item.group: Result(item, true[item.group]) for item in estimates}
 
 
 def measure(situation: Situation, samples: int) -> dict[str, list[Result]]:

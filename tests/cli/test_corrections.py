@@ -101,8 +101,8 @@ def test_several_videos_have_corrections_of_their_own(run: Run, folder: Path) ->
             "events": 1, "files": ["b.yaml"], "names": ["gate"], "checked": [[0.0, 1.96]],
             "corrections": [
                 {
-                    "counted": None,
-                    "right": {"time": 0.1, "name": "gate", "direction": "in", "class": "truck"},
+                    "time": 0.1, "name": "gate", "direction": "in", "class": "truck",
+                    "error": ["missed"], "correct": [],
                     "reviewer": "Ann", "saved": "2026-05-01 10:00:00.000+00:00",
                 },
             ],
@@ -113,8 +113,8 @@ def test_several_videos_have_corrections_of_their_own(run: Run, folder: Path) ->
                     (None, None, None, 1, 2),
                     ("gate", "out", None, 1, 1),
                     ("gate", "in", None, 0, 1),
-                    (None, None, "vehicle", 1, 1),
                     (None, None, "truck", 0, 1),
+                    (None, None, "vehicle", 1, 1),
                 )
             ],
         },

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from benchmarks.corrections import by_class, classified, damaged, review
@@ -25,7 +26,7 @@ from vdet.errors import ConfigError
 from vdet.labels.label import SourceVideo
 from vdet.review.correcting import apply_corrections
 from vdet.review.corrections import Corrections, by_video
-from vdet.review.estimate import CountError, estimate
+from vdet.review.estimate import estimate
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import ALL, Counts, Event, VehicleGroup
 
@@ -164,15 +165,17 @@ def test_checked_minutes_of_a_sample_say_how_many_passed_in_all(tmp_path: Path) 
     )
     here, away = VehicleGroup("line", "here"), VehicleGroup("line", "away")
     car, bus = VehicleGroup(class_name="car"), VehicleGroup(class_name="bus")
-    none = [0] * 10
-    table = {ALL: [1] * 10, away: none, here: [1] * 10}
-    table |= {
-        VehicleGroup("second", "away"): none,
-        VehicleGroup("second", "here"): none,
-        car: [1] * 10,
-    }
-    errors = [CountError(1, (), (ALL, away, bus)), CountError(5, (ALL, here, car), ())]
-    assert after.estimates == tuple(estimate(table, errors, checked=range(3), drawn=range(3)))
+    second = VehicleGroup("second", "away"), VehicleGroup("second", "here")
+    none, one = np.zeros((3, 10), np.int64), np.ones(10, np.int64)
+    numbers = {group: none.copy() for group in (ALL, away, here, *second, car, bus)}
+    for group in (ALL, here, car):
+        numbers[group][0] = one
+        numbers[group][2, 5] = 1  # a false one
+    for group in (ALL, away, bus):
+        numbers[group][1, 1] = 1  # a missed one
+    by_group = {item.group: item for item in after.estimates}
+    exact = estimate(numbers, checked=range(3), drawn=range(3))
+    assert by_group == {item.group: item for item in exact}
     path = saved(tmp_path / "c.yaml", missed(190), start=1.5)
     unchecked = corrected(video, path).corrected
     assert unchecked

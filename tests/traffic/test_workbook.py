@@ -211,10 +211,10 @@ NOTHING = "0 0 0 0 0 - 0"
 def test_intervals_and_flows_have_columns_of_classes_and_mark_parts(book: Path) -> None:
     sheets = lines_of(book)
     assert sheets["Checks"] == table("""
-        file time_in_the_file line_or_zone counted_as class right class reviewer saved
-        07.jsonl 0:01:00 north in  bus in car   Ann 07:00:00
-        07.jsonl 0:16:40 north -   -   in truck Ann 07:00:00
-        07.jsonl 0:01:10 south out bus -  -     -   -""")
+        file time_in_the_file line_or_zone direction class error correct reviewer saved
+        07.jsonl 0:01:00 north in  bus   class  car Ann 07:00:00
+        07.jsonl 0:16:40 north in  truck missed -   Ann 07:00:00
+        07.jsonl 0:01:10 south out bus   false  -   -   -""")
     first, second = "07:00:00 07:30:00 1800 - 0", "07:30:00 08:00:00 1800 - 0"
     part = "08:00:00 08:30:00 600 part 0"
     numbers = "all_vehicles per_hour car truck tractor heavy,_% PCU"

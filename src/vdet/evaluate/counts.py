@@ -93,7 +93,7 @@ def score_counts(path: Path, truth: Corrections) -> list[CountScore]:
     zones = tuple(zone.name for zone in truth.zones)
     counts = Counts(_read_events(path), (), zones, spans=((-math.inf, math.inf),))
     scores: dict[tuple[str, str, str], CountScore] = {}
-    for item in judge(counts, truth, []):
+    for item in judge(counts, truth):
         sides = [(item.right, item.counted)]
         if item.right and item.counted and item.right.direction != item.counted.direction:
             sides = [(item.right, None), (None, item.counted)]

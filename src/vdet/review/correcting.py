@@ -1,10 +1,14 @@
 """Counts as reviewers say that they are right, and an estimate of what nobody has checked."""
 
+from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, count, pairwise
+from math import inf
 from pathlib import Path
+
+import numpy as np
 
 from vdet.config.classes import is_chosen
 from vdet.config.loading import MAX_MISTAKES
@@ -13,13 +17,14 @@ from vdet.errors import ConfigError
 from vdet.findings import Finding
 from vdet.labels.label import NO_ID
 from vdet.review.corrections import TOLERANCE, Corrections, ReviewedEvent, by_video, paired
-from vdet.review.estimate import CountError, EqualSpans, estimate
+from vdet.review.estimate import equal_spans, estimate
 from vdet.traffic.clock import Span
 from vdet.traffic.counts import (
     ALL,
     Corrected,
     Correction,
     Counts,
+    Direction,
     Estimate,
     Event,
     VehicleGroup,
@@ -38,20 +43,14 @@ class Judged:
     """An event as it was counted, and as it is right; None: it is not.
 
     `reviewed` is what a reviewer says of it, and `is_certain` whether that holds for its class and
-    direction too; else it only tells which event is which.
+    direction too; else it only tells which event is which. `fault` says why that does not fit.
     """
 
     reviewed: ReviewedEvent | None
     counted: Event | None
     right: Event | None
     is_certain: bool = False
-
-    @property
-    def is_changed(self) -> bool:
-        """Whether it is corrected."""
-        if self.counted and self.right:
-            return replace(self.counted, time=self.right.time) != self.right
-        return self.counted is not self.right
+    fault: str | None = None
 
 
 def all_classes(settings: Settings, reviews: Sequence[Corrections]) -> Settings:
@@ -68,26 +67,17 @@ def correct(
     removed, added or changed. A vehicle gets another class in all its events, also in other videos.
     Only the classes of the settings are kept.
     """
-    judged, faults = dict[str, list[Judged]](), dict[str, list[str]]()
-    for key, counts in videos.items():
-        faults[key] = []
-        none = [Judged(None, event, event) for event in counts.events]
-        review = corrections.get(key)
-        judged[key] = judge(counts, review, faults[key]) if review else none
-    _name_vehicles([item for items in judged.values() for item in items])
+    judged = {key: judge(counts, corrections.get(key)) for key, counts in videos.items()}
+    _name_vehicles(list(chain.from_iterable(judged.values())))
     result = {}
     for key, counts in videos.items():
         chosen = [_of_classes(item, settings.classes) for item in judged[key]]
-        events = sorted(
-            (item.right for item in chosen if item.right),
-            key=lambda event: (event.time, event.frame, event.id, event.name),
-        )
-        result[key] = replace(
-            counts, events=tuple(events), classes=settings.classes or counts.classes
-        )
+        right = sorted((item.right for item in chosen if item.right), key=Event.order)
+        classes = settings.classes or counts.classes
+        result[key] = replace(counts, events=tuple(right), classes=classes)
         if review := corrections.get(key):
-            corrected = _corrected(counts, review, chosen, faults[key])
-            problems = [*corrected.faults, *map(_IMBALANCE.format, unbalanced_zones(result[key]))]
+            corrected = _corrected(counts, review, chosen)
+            problems = (*corrected.faults, *map(_IMBALANCE.format, unbalanced_zones(result[key])))
             found = tuple(Finding("corrections", problem) for problem in problems)
             findings = (*counts.findings, *found)
             result[key] = replace(result[key], corrected=corrected, findings=findings)
@@ -112,40 +102,38 @@ def apply_corrections(
     return result
 
 
-def judge(counts: Counts, review: Corrections, faults: list[str]) -> list[Judged]:
-    """Return all events that were counted or are right; add what does not fit to `faults`.
-
-    Added vehicles have no number yet.
-    """
-    start, end = counts.spans[0][0] - TOLERANCE, counts.spans[-1][1] + TOLERANCE
-    listed = [e for e in review.events if counts.left_out is None or e.time >= counts.left_out]
-    inside = [event for event in listed if start <= event.time <= end]
-    part = f"is outside the counted part, {counts.spans[0][0]:g} to {counts.spans[-1][1]:g} s"
-    faults += [f"{review.source}: {e}: {part}" for e in listed if not start <= e.time <= end]
-    classes = {event.id: event.true_class for event in listed if "class" in event.errors}
-    classes.pop(NO_ID, None)
-    result = []
+def judge(counts: Counts, review: Corrections | None) -> list[Judged]:
+    """Return all events that were counted or are right; added vehicles have no number yet."""
+    if review is None:
+        return [Judged(None, event, event) for event in counts.events]
+    (first, _), (_, last) = counts.spans[0], counts.spans[-1]
+    start = -inf if counts.left_out is None else counts.left_out
+    listed = [event for event in review.events if event.time >= start]
+    inside = [event for event in listed if first - TOLERANCE <= event.time <= last + TOLERANCE]
+    outside = f"is outside the counted part, {first:g} to {last:g} s"
+    far = (e for e in listed if not first - TOLERANCE <= e.time <= last + TOLERANCE)
+    items = [Judged(event, None, None, fault=outside) for event in far]
+    classes = {e.id: e.true_class for e in listed if "class" in e.errors and e.id != NO_ID}
     for reviewed, event in paired(inside, counts.events):
         is_listed = any(side and review.lists(side) for side in (reviewed, event))
-        is_certain = is_listed or bool(reviewed and reviewed.errors)
-        item = Judged(reviewed, event, event, is_certain)
-        if reviewed and is_certain and (event or is_listed or reviewed.is_missed):
+        item = Judged(reviewed, event, event, is_listed or bool(reviewed and reviewed.errors))
+        if reviewed and (is_listed or "missed" in reviewed.errors or (event and item.is_certain)):
             item.right = _right(reviewed, classes.get(reviewed.id, reviewed.true_class), event)
         elif is_listed:
             item.right = None
-        elif reviewed and reviewed.errors:
-            faults.append(
-                f"{review.source}: {reviewed}: no such event was counted within {TOLERANCE} s; "
-                "remove this correction, or check these counts anew"
+        elif item.is_certain:
+            item.fault = (
+                f"no such event was counted within {TOLERANCE} s; remove this correction, or check "
+                "these counts anew"
             )
-        result.append(item)
-    _complete_visits(result, counts.zones)
-    return result
+        items.append(item)
+    _complete_visits(items, counts.zones)
+    return items
 
 
 def _right(reviewed: ReviewedEvent, class_name: str, event: Event | None) -> Event | None:
     """Return an event as it is right; None: it is not."""
-    if reviewed.is_false:
+    if not reviewed.truth:
         return None
     added = Event(
         time=reviewed.time,
@@ -204,19 +192,19 @@ def _of_classes(item: Judged, chosen: Collection[str]) -> Judged:
     return replace(item, counted=counted, right=right)
 
 
-def _corrected(
-    counts: Counts, review: Corrections, items: Sequence[Judged], faults: Sequence[str]
-) -> Corrected:
+def _corrected(counts: Counts, review: Corrections, items: Sequence[Judged]) -> Corrected:
     """Return how counts were corrected."""
     names = {span.line for span in review.checked}
     checked = _checked(review, names)
+    every = (
+        Correction(item.counted, item.right, by.reviewer, by.saved)
+        for item, by in ((item, item.reviewed or review) for item in items)
+        if item.counted or item.right
+    )
+    faults = (f"{review.source}: {item.reviewed}: {item.fault}" for item in items if item.fault)
     return Corrected(
         counted=tuple(item.counted for item in items if item.counted),
-        corrections=tuple(
-            Correction(item.counted, item.right, by.reviewer, by.saved)
-            for item, by in ((item, item.reviewed or review) for item in items)
-            if item.is_changed
-        ),
+        corrections=tuple(correction for correction in every if correction.errors),
         files=tuple(Path(name).name for name in review.files),
         names=tuple(dict.fromkeys(name for name, _ in counts.directions if name in names)),
         checked=tuple(
@@ -236,7 +224,7 @@ def _checked(review: Corrections, names: Collection[str]) -> list[Span]:
     spans: list[Span] = []
     edges = sorted({edge for span in review.checked for edge in (span.start, span.end)})
     for start, end in pairwise(edges):
-        if all(review.has_checked(name, start) for name in names):
+        if all(review.checks(name, start) for name in names):
             joined = spans.pop()[0] if spans and spans[-1][1] == start else start
             spans.append((joined, end))
     return spans
@@ -256,31 +244,27 @@ def _estimates(
     end = last if review.end is None else review.end
     if not checked or first < review.start - TOLERANCE or last > end + TOLERANCE:
         return []  # nothing is known of what lies outside the part that was reviewed
-    spans = EqualSpans(review.start, end, review.span, counts.spans)
-    names = {span.line for span in review.checked}
+    spans = equal_spans(review.start, end, review.span, counts.spans)
+    starts, names = [start for start, _ in spans.values()], {span.line for span in review.checked}
     ways = [(n, way) for n, way in counts.directions if n in names and review.shows(n, way)]
-    table = {group: [0] * len(spans) for group in (ALL, *(VehicleGroup(*way) for way in ways))}
-
-    def groups(event: Event | None) -> tuple[VehicleGroup, ...]:
-        if not event or (event.name, event.direction) not in ways:
-            return ()
-        direction, kind = (
-            VehicleGroup(event.name, event.direction),
-            VehicleGroup(class_name=class_of(event)),
-        )
-        return ALL, direction, kind
-
-    errors = list[CountError]()
+    groups = ALL, *(VehicleGroup(*way) for way in ways)
+    numbers = {group: np.zeros((3, len(spans)), np.int64) for group in groups}
     for item in items:
         if event := item.right or item.counted:
-            index, counted, right = (
-                spans.index(event.time),
-                *map(groups, (item.counted, item.right)),
-            )
-            for group in counted:
-                table.setdefault(group, [0] * len(spans))[index] += 1
-            if counted != right:
-                errors.append(CountError(index, counted, right))
-    known = [index for index in range(len(spans)) if covers(checked, spans.bounds(index))]
-    drawn = [index for index, number in enumerate(spans.numbers) if number in review.drawn]
-    return estimate(table, errors, known, drawn)
+            index = max(0, bisect_right(starts, event.time) - 1)
+            before, after = (_groups(side, ways) for side in (item.counted, item.right))
+            for group in dict.fromkeys(before + after):
+                was, is_now = group in before, group in after
+                of_group = numbers.setdefault(group, np.zeros((3, len(spans)), np.int64))
+                of_group[:, index] += was, is_now > was, was > is_now
+    known = [index for index, span in enumerate(spans.values()) if covers(checked, span)]
+    drawn = [index for index, number in enumerate(spans) if number in review.drawn]
+    return estimate(numbers, known, drawn)
+
+
+def _groups(event: Event | None, ways: Collection[Direction]) -> tuple[VehicleGroup, ...]:
+    """Return the groups of an event at a checked line."""
+    if not event or (event.name, event.direction) not in ways:
+        return ()
+    direction = VehicleGroup(event.name, event.direction)
+    return ALL, direction, VehicleGroup(class_name=class_of(event))

@@ -1,9 +1,11 @@
 """Files of corrections: what reviewers say of the counts of a video."""
 
 import json
+from bisect import bisect_left, bisect_right
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
@@ -26,7 +28,7 @@ MAX_A_SECOND = 200
 """Maximum number of events at a line within a second."""
 _PIXELS = 1.0
 """Maximum distance between the points of the same line, pixels of the review."""
-_SECONDS = 1.0
+_SECONDS = timedelta(seconds=1)
 """Maximum difference between the lengths, and between the beginnings, of the same video."""
 TOLERANCE = 0.5
 """Maximum seconds between two records of an event."""
@@ -82,9 +84,7 @@ class ReviewedEvent(Section):
 
     @property
     def _correct(self) -> dict[str, str]:
-        return dict(
-            zip(self.errors, self.correct, strict=False)
-        )  # nothing is correct of the others
+        return dict(zip(self.errors, self.correct, strict=False))  # missed, false: nothing is
 
     @property
     def true_direction(self) -> str:
@@ -98,19 +98,9 @@ class ReviewedEvent(Section):
         return standard_class(label) or label
 
     @property
-    def is_missed(self) -> bool:
-        """Whether the vehicle passed, but was not counted."""
-        return "missed" in self.errors
-
-    @property
-    def is_false(self) -> bool:
-        """Whether it was counted, but no vehicle passed."""
-        return "false" in self.errors
-
-    @property
     def truth(self) -> tuple[str, str] | None:
         """Direction and class of the vehicle that passed; None: none did."""
-        return None if self.is_false else (self.true_direction, self.true_class)
+        return None if "false" in self.errors else (self.true_direction, self.true_class)
 
 
 E = TypeVar("E", bound=ReviewedEvent | Event)
@@ -128,38 +118,31 @@ def paired(
     from scipy.sparse import csr_array  # most runs load nothing of it
     from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
-    lines: dict[str, list[int]] = {}
+    if not reviewed:
+        return [(None, event) for event in events]
+    lines = defaultdict[str, list[int]](list)
     for number in sorted(range(len(events)), key=lambda number: events[number].time):
-        lines.setdefault(events[number].name, []).append(number)
-    times = {name: np.array([events[n].time for n in line]) for name, line in lines.items()}
+        lines[events[number].name].append(number)
     edges: list[tuple[int, int, float]] = []
     for row, review in enumerate(reviewed):
         cost = min((_ALONE.get(error, 3.0) for error in review.errors), default=3.0)
         edges.append((row, len(events) + row, cost))
-        if line := lines.get(review.name):
-            reach = (review.time - TOLERANCE, review.time + TOLERANCE)
-            first, end = np.searchsorted(times[review.name], reach).tolist()
-            for column in line[first:end]:
-                if not _ways(review).isdisjoint(_ways(events[column])):
-                    edges.append((row, column, _cost(review, events[column])))  # noqa: PERF401
-    partners: dict[int, int] = {}
-    if edges:
-        rows, columns, costs = map(np.array, zip(*edges, strict=True))
-        shape = len(reviewed), len(events) + len(reviewed)
-        matching = min_weight_full_bipartite_matching(csr_array((costs, (rows, columns)), shape))
-        partners = dict(zip(*(part.tolist() for part in matching), strict=True))
-    pairs: list[tuple[ReviewedEvent | None, E | None]] = []
-    for row, review in enumerate(reviewed):
-        column = partners[row]
-        pairs.append((review, events[column] if column < len(events) else None))
-    alone = sorted({*range(len(events))} - {*partners.values()})
-    return [*pairs, *((None, events[number]) for number in alone)]
+        line, time = lines[review.name], review.time
+        first = bisect_left(line, time - TOLERANCE, key=lambda number: events[number].time)
+        end = bisect_right(line, time + TOLERANCE, key=lambda number: events[number].time)
+        near = ((number, events[number]) for number in line[first:end])
+        edges += [(row, n, _cost(review, e)) for n, e in near if _ways(review) & _ways(e)]
+    rows, columns, costs = map(np.array, zip(*edges, strict=True))
+    shape = len(reviewed), len(events) + len(reviewed)
+    matching = min_weight_full_bipartite_matching(csr_array((costs, (rows, columns)), shape))
+    partners = [column for _, column in sorted(zip(*map(np.ndarray.tolist, matching), strict=True))]
+    alone = sorted({*range(len(events))} - {*partners})
+    found = [events[column] if column < len(events) else None for column in partners]
+    return [*zip(reviewed, found, strict=True), *((None, events[number]) for number in alone)]
 
 
 def _ways(event: ReviewedEvent | Event) -> set[str]:
-    if isinstance(event, ReviewedEvent):
-        return {event.direction, event.true_direction}
-    return {event.direction}
+    return {event.direction, getattr(event, "true_direction", event.direction)}
 
 
 def _cost(review: ReviewedEvent, event: ReviewedEvent | Event) -> float:
@@ -252,24 +235,19 @@ class Corrections(Section):
             values = json.loads(read_whole(path, limit=MAX_BYTES, what=what, error=ConfigError))
             document = Document(str(path), values) if isinstance(values, dict) else None
         document = document or read_document(path, limit=MAX_BYTES, what=what)
-        corrections = validated(Corrections, document)
+        result = validated(Corrections, document)
         # Of 1.1.0: `start` is the time of the first frame, from which times count today.
-        zero = corrections.start if corrections.end is None else 0.0
-        by_whom = {"reviewer": corrections.reviewer, "saved": corrections.saved}
-        update: dict[str, Any] = {
-            "start": corrections.start - zero,
-            "events": tuple(
-                event.model_copy(update=by_whom | {"time": event.time - zero})
-                for event in corrections.events
-            ),
-            "checked": tuple(
-                span.model_copy(update={"start": span.start - zero, "end": span.end - zero})
-                for span in corrections.checked
-            ),
-        }
-        corrections = corrections.model_copy(update=update)
-        corrections._files = (str(path),)
-        return corrections
+        zero = result.start if result.end is None else 0.0
+        by_whom = {"reviewer": result.reviewer, "saved": result.saved}
+        events = (e.model_copy(update={"time": e.time - zero, **by_whom}) for e in result.events)
+        spans = (
+            span.model_copy(update={"start": span.start - zero, "end": span.end - zero})
+            for span in result.checked
+        )
+        update = {"start": result.start - zero, "events": tuple(events), "checked": tuple(spans)}
+        result = result.model_copy(update=update)
+        result._files = (str(path),)
+        return result
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -308,13 +286,13 @@ class Corrections(Section):
         size = video.width, video.height
         if size != self.size:
             return "frames of {}×{}, not {}×{}".format(*size, *self.size)
-        if video.length and self.length and abs(video.length - self.length) > _SECONDS:
-            return f"a length of {video.length:.1f} s, not {self.length:.1f} s"
         if (
-            video.begin
-            and self.begin
-            and abs((video.begin - self.begin).total_seconds()) > _SECONDS
+            video.length
+            and self.length
+            and abs(video.length - self.length) > _SECONDS.total_seconds()
         ):
+            return f"a length of {video.length:.1f} s, not {self.length:.1f} s"
+        if video.begin and self.begin and abs(video.begin - self.begin) > _SECONDS:
             return f"the beginning {video.begin}, not {self.begin}"
         return None
 
@@ -338,17 +316,15 @@ class Corrections(Section):
                 f"{self.source} and {other.source}: contradict each other: {disputed[0]}; correct "
                 "one of them"
             )
-        names = self.traffic.directions
         best = max(self, other, key=lambda review: (len(review.drawn), review.span, -review.start))
         is_one = (self.start, self.end, self.span) == (other.start, other.end, other.span)
         drawn = {*best.drawn, *(self.drawn + other.drawn if is_one else ())}
         update = {
-            "lines": (*self.lines, *(line for line in other.lines if line.name not in names)),
-            "zones": (*self.zones, *(zone for zone in other.zones if zone.name not in names)),
+            "lines": tuple({line.name: line for line in self.lines + other.lines}.values()),
+            "zones": tuple({zone.name: zone for zone in self.zones + other.zones}.values()),
             "events": (*self.events, *added),
             "checked": self.checked + other.checked,
-            "sample": best.sample
-            and best.sample.model_copy(update={"spans": tuple(sorted(drawn))}),
+            "sample": best.sample and Sample(seed=best.sample.seed, spans=tuple(sorted(drawn))),
         }
         result = best.model_copy(update=update)
         result._files = self._files + other._files
@@ -359,9 +335,9 @@ class Corrections(Section):
         """The spans that were drawn."""
         return self.sample.spans if self.sample else ()
 
-    def has_checked(self, name: str, time: float) -> bool:
-        """Return whether a line or zone was checked at a time, seconds in the video."""
-        return any(s.line == name and s.start <= time < s.end for s in self.checked)
+    def checks(self, name: str, time: float) -> list[CheckedSpan]:
+        """Return the checked spans of a line or zone at a time, seconds in the video."""
+        return [s for s in self.checked if s.line == name and s.start <= time < s.end]
 
     def shows(self, name: str, direction: str) -> bool:
         """Return whether a strip shows a direction: not what appears or vanishes in a zone."""
@@ -369,17 +345,15 @@ class Corrections(Section):
 
     def lists(self, event: ReviewedEvent | Event) -> bool:
         """Return whether all that passed where and when an event is right is listed."""
-        way = event.true_direction if isinstance(event, ReviewedEvent) else event.direction
-        return self.shows(event.name, way) and any(
-            s.complete and s.line == event.name and s.start <= event.time < s.end
-            for s in self.checked
-        )
+        way = getattr(event, "true_direction", event.direction)
+        spans = self.checks(event.name, event.time)
+        return self.shows(event.name, way) and any(span.complete for span in spans)
 
     def _disputes(self, event: ReviewedEvent) -> bool:
         """Return whether an event that it lacks was checked, and is right elsewhere."""
         if self.lists(event):
             return event.truth is not None
-        return bool(event.errors) and self.has_checked(event.name, event.time)
+        return bool(event.errors and self.checks(event.name, event.time))
 
 
 def by_video(

@@ -3,9 +3,10 @@
 The page of a review computes the same in `estimate.js`, which explains the method and its sources.
 """
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, hypot, inf, sqrt
 
 import numpy as np
@@ -40,35 +41,20 @@ def span_length(seconds: float) -> float:
     return round(seconds / max(1, round(seconds / _SPAN)), 6) or _SPAN
 
 
-class EqualSpans:
-    """The spans of a part of a video that have frames; `numbers` are theirs, from 0.
+def equal_spans(start: float, end: float, length: float, video: Iterable[Span]) -> dict[int, Span]:
+    """Return the spans of a part of a video that have frames, by their numbers from 0.
 
-    `video` are the parts with frames, seconds.
+    `video` are the parts with frames. All are seconds; the end of a span is not part of it.
     """
-
-    def __init__(self, start: float, end: float, length: float, video: Iterable[Span]) -> None:
-        self._count = max(1, ceil((end - start) / length - _REST))
-        self._starts = [round(start + number * length, 3) for number in range(self._count)]
-        self._end = end
-        every = ((self._number(first), self._number(last)) for first, last in video)
-        self.numbers = sorted({n for first, last in every for n in range(first, last + 1)})
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def index(self, time: float) -> int:
-        """Return the index of the span of a time, or of the nearest one."""
-        number = self._number(time)
-        return max(0, bisect_right(self.numbers, number) - 1)
-
-    def bounds(self, index: int) -> Span:
-        """Return the start of a span and its end, which is not part of it."""
-        number = self.numbers[index]
-        is_last = number + 1 == self._count
-        return self._starts[number], self._end if is_last else self._starts[number + 1]
-
-    def _number(self, time: float) -> int:
-        return max(0, bisect_right(self._starts, time) - 1)
+    count = max(1, ceil((end - start) / length - _REST))
+    edges = [*(round(start + number * length, 3) for number in range(count)), end]
+    parts = list(video)
+    spans = {
+        number: (first, last)
+        for number, (first, last) in enumerate(pairwise(edges))
+        if any(begin < last and first <= until for begin, until in parts)
+    }
+    return spans or {0: (start, end)}
 
 
 def strata_of(traffic: Sequence[int] | Int64Array) -> Int64Array:
@@ -85,7 +71,7 @@ def strata_of(traffic: Sequence[int] | Int64Array) -> Int64Array:
     return strata
 
 
-def draw_spans(traffic: Sequence[int], seed: int) -> list[int]:
+def draw_spans(traffic: Sequence[int] | Int64Array, seed: int) -> list[int]:
     """Return all spans in the order in which to check them.
 
     The first n are a random sample of n spans, stratified by traffic, so a longer sample includes a
@@ -107,39 +93,17 @@ def draw_spans(traffic: Sequence[int], seed: int) -> list[int]:
     return [int(span) for span in np.argsort(turns, kind="stable")]
 
 
-@dataclass(frozen=True, slots=True)
-class CountError:
-    """An error that a person found: a vehicle that is missed, counted wrongly or named wrongly.
-
-    Attributes
-    ----------
-    span
-        Index of the span.
-    counted
-        The groups in which it was counted; none if it was missed.
-    true
-        The groups in which it is right; none if no vehicle passed.
-    """
-
-    span: int
-    counted: Collection[VehicleGroup]
-    true: Collection[VehicleGroup]
-
-
 def estimate(
-    counted: Mapping[VehicleGroup, Sequence[int]],
-    errors: Sequence[CountError],
-    checked: Collection[int],
-    drawn: Collection[int],
+    numbers: Mapping[VehicleGroup, Int64Array], checked: Collection[int], drawn: Collection[int]
 ) -> list[Estimate]:
-    """Estimate the true number of vehicles in each group.
+    """Estimate the true number of vehicles in each group, also of `ALL`.
 
     Parameters
     ----------
-    counted
-        Number of vehicles of each group counted in each span of the video, also of `ALL`.
-    errors
-        All known errors; the estimate uses those in checked spans.
+    numbers
+        Of each group: vehicles counted in each span of the video, and of all known errors, those
+        missed in this group, and those counted wrongly in it; (3, spans) int64. The estimate uses
+        errors in checked spans.
     checked
         Spans that were checked. Those that were not drawn count as they are, and say nothing about
         the others.
@@ -151,15 +115,13 @@ def estimate(
     An estimate for each group; empty if spans are left and fewer than `MIN_CHECKED` drawn ones are
     checked.
     """
-    traffic = np.asarray(counted[ALL], np.int64)
+    traffic = numbers[ALL][0]
     sample = np.array(sorted({*checked} & {*drawn}), np.int64)
     unchecked = np.array(sorted({*range(len(traffic))} - {*checked}), np.int64)
     if len(unchecked) and len(sample) < MIN_CHECKED:
         return []
-    survey = _CheckedSample(traffic, errors, sample, unchecked)
-    groups = dict.fromkeys((*counted, *(group for error in errors for group in error.true)))
-    none = np.zeros_like(traffic)
-    return [survey.estimate(name, np.asarray(counted.get(name, none))) for name in groups]
+    survey = _CheckedSample(traffic, sample, unchecked)
+    return [survey.estimate(group, of_group) for group, of_group in numbers.items()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,28 +169,24 @@ class _Unchecked:
 
 @dataclass(frozen=True, slots=True)
 class _CheckedSample:
-    """Counted spans (traffic, (spans,) int64), with the errors found in a sample of them."""
+    """A sample of spans, by their indices; `traffic` is what was counted, (spans,) int64."""
 
     traffic: Int64Array
-    errors: Sequence[CountError]
     sample: Int64Array
     unchecked: Int64Array
 
     def estimate(self, group: VehicleGroup, numbers: Int64Array) -> Estimate:
-        """Return the estimate of a group; `numbers` are its vehicles in each span."""
-        counted = int(numbers.sum())
-        added, removed = np.zeros_like(numbers), np.zeros_like(numbers)
-        for error in self.errors:
-            added[error.span] += group in error.true and group not in error.counted
-            removed[error.span] += group in error.counted and group not in error.true
-        corrected = counted + int(added.sum() - removed.sum())
-        added[self.unchecked] = removed[self.unchecked] = 0
-        known = counted + int(added.sum() - removed.sum())
+        """Return the estimate of a group; `numbers` as for the function `estimate`."""
+        counted, missed, false = map(int, numbers.sum(axis=1))
+        corrected = counted + missed - false
+        _, missed_elsewhere, false_elsewhere = map(int, numbers[:, self.unchecked].sum(axis=1))
+        known = corrected - missed_elsewhere + false_elsewhere
         if not len(self.unchecked):
             return Estimate(group, counted, corrected, known, known, known, 0)
-        unseen = _HIDDEN * float(numbers.mean())
+        each, added, removed = numbers
+        unseen, left = _HIDDEN * float(each.mean()), float(each[self.unchecked].sum())
         gains = self._expected(added, self.traffic + 1, inf, unseen)  # empty spans have errors too
-        losses = self._expected(removed, numbers, float(numbers[self.unchecked].sum()), 0.0)
+        losses = self._expected(removed, each, left, 0.0)
         true = known + gains.number - losses.number
         below, above = self._widths(gains, losses, 0)
         widths = [-sum(self._widths(gains, losses, more)) for more in range(len(self.unchecked))]

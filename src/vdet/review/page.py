@@ -2,8 +2,9 @@
 
 import tempfile
 from base64 import b64encode
+from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 from typing import Any, Self, TextIO
@@ -25,7 +26,7 @@ from vdet.media.images import coarse_scale, shrunk
 from vdet.pages.render import TEMPLATES, render
 from vdet.review.correcting import correct, covers
 from vdet.review.corrections import MAX_BYTES, Corrections
-from vdet.review.estimate import EqualSpans, draw_spans, span_length, strata_of
+from vdet.review.estimate import draw_spans, equal_spans, span_length, strata_of
 from vdet.review.strips import (
     Band,
     BandPassage,
@@ -36,6 +37,7 @@ from vdet.review.strips import (
 )
 from vdet.review.traces import TraceSearch
 from vdet.track.track import FrameTracks
+from vdet.traffic.clock import Span
 from vdet.traffic.counts import Corrected, Counts, Event, Trace, class_of
 from vdet.traffic.crossings import Border
 from vdet.traffic.records import BestCrops, Crop
@@ -136,7 +138,9 @@ class Review:
 
     def data(self) -> dict[str, Any]:
         """Return the values for the script of the page."""
-        video, spans = self.video, self._spans()
+        video, head = self.video, self._head()
+        spans = equal_spans(head["start"], head["end"], head["span"], self.counted.spans)
+        numbers, starts = list(spans), [start for start, _ in spans.values()]
         marks = [{**_values(mark), "id": mark.event.id} for mark in self.marks]
         unlisted = {class_of(mark.event) for mark in (*self.marks, *self.added)} - set(
             STANDARD_CLASSES
@@ -144,10 +148,10 @@ class Review:
         traffic = [0] * len(spans)
         for mark in self.marks:
             if mark.band is not None:
-                traffic[spans.index(mark.event.time)] += 1
+                traffic[max(0, bisect_right(starts, mark.event.time) - 1)] += 1
         seed = crc32(video.path.name.encode("utf-8", "surrogateescape"))
         return {
-            "head": self._head(),
+            "head": head,
             "limit": MAX_BYTES,
             "key": self.key,
             "zones": [zone.name for zone in self.traffic.zones],
@@ -158,20 +162,14 @@ class Review:
             "classes": [*STANDARD_CLASSES, *sorted(unlisted)],
             "spans": [
                 {"number": number, "start": start, "end": end}
-                for number, (start, end) in zip(
-                    spans.numbers, map(spans.bounds, range(len(spans))), strict=True
-                )
+                for number, (start, end) in spans.items()
             ],
             "strata": strata_of(traffic).tolist(),
             # The seed follows from the name, so nobody can draw until it looks good.
-            "order": [spans.numbers[index] for index in draw_spans(traffic, seed)],
+            "order": [numbers[index] for index in draw_spans(traffic, seed)],
             "seed": seed,
             "opened": self._state(spans),
         }
-
-    def _spans(self) -> EqualSpans:
-        head = self._head()
-        return EqualSpans(head["start"], head["end"], head["span"], self.counted.spans)
 
     def _head(self) -> dict[str, Any]:
         """Return what a file of corrections says of its video and of the lines."""
@@ -193,34 +191,17 @@ class Review:
             "zones": [zone.model_dump(mode="json", include=fields) for zone in shapes.zones],
         }
 
-    def _state(self, spans: EqualSpans) -> dict[str, Any] | None:
+    def _state(self, spans: Mapping[int, Span]) -> dict[str, Any] | None:
         """Return what a reviewer changed, as the script has it."""
         if not (self.opened and self.reviewed):
             return None
         keys = {mark.event: f"c{number}" for number, mark in enumerate(self.marks)}
-        fixes, times = dict[str, dict[str, str | None]](), dict[str, float]()
-        for item in self.opened.corrections:
-            if item.counted and (right := item.right):
-                ways, names = (
-                    (item.counted.direction, right.direction),
-                    (class_of(item.counted), class_of(right)),
-                )
-                wrong = {"class": names, "direction": ways}
-                fixes[keys[item.counted]] = {
-                    k: after for k, (before, after) in wrong.items() if before != after
-                }
-                times[keys[item.counted]] = round(right.time, 3)
-            elif item.counted:
-                fixes[keys[item.counted]] = {"false": None}
+        corrected = [(keys[c.counted], c) for c in self.opened.corrections if c.counted]
         return {
-            "fixes": fixes,
-            "times": times,
+            "fixes": {key: item.errors for key, item in corrected},
+            "times": {key: round(item.right.time, 3) for key, item in corrected if item.right},
             "missed": [_values(mark) for mark in self.added],
-            "checked": [
-                number
-                for index, number in enumerate(spans.numbers)
-                if covers(self.opened.checked, spans.bounds(index))
-            ],
+            "checked": [n for n, span in spans.items() if covers(self.opened.checked, span)],
             "reviewer": self.reviewed.reviewer or "",
             "sample": self.reviewed.sample and self.reviewed.sample.model_dump(),
         }

@@ -120,7 +120,7 @@ class VehicleCounter:
         """Return all results, as if the video ended now."""
         passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for passage in passages for event in passage.events]
-        events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
+        events.sort(key=Event.order)
         directions = tuple((item.name, way) for item in self.borders for way in item.directions)
         findings = list(_line_findings(self.lines, passages))
         if lack := self._settings.camera.lack_of_speeds:

@@ -80,6 +80,10 @@ class Event:
     mean_speed: float | None = None
     source: str | None = None
 
+    def order(self) -> tuple[float, int, int, str]:
+        """Return a key that sorts events."""
+        return self.time, self.frame, self.id, self.name
+
 
 @dataclass(frozen=True, slots=True)
 class GroupedEvent:
@@ -231,6 +235,27 @@ class Correction:
     right: Event | None
     reviewer: str | None = None
     saved: datetime | None = None
+
+    @property
+    def errors(self) -> dict[str, str | None]:
+        """What is wrong, as files of corrections name it, and what is correct of it."""
+        if not (self.counted and self.right):
+            return {"false" if self.counted else "missed": None}
+        before, after = (
+            {"class": class_of(event), "direction": event.direction}
+            for event in (self.counted, self.right)
+        )
+        return {name: after[name] for name in before if before[name] != after[name]}
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The values for tables and JSON."""
+        event = self.counted or self.right
+        assert event
+        place = {"time": event.time, "name": event.name, "direction": event.direction}
+        correct = [value for value in self.errors.values() if value]
+        errors = {"class": class_of(event), "error": list(self.errors), "correct": correct}
+        return {**place, **errors, "reviewer": self.reviewer, "saved": self.saved}
 
 
 @dataclass(frozen=True, slots=True)

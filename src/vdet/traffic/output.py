@@ -152,12 +152,7 @@ def _json(
 
 def _corrected(corrected: Corrected) -> dict[str, Any]:
     corrections = [
-        {
-            "counted": _place(item.counted),
-            "right": _place(item.right),
-            "reviewer": item.reviewer,
-            "saved": plain_time(item.saved),
-        }
+        {name: plain_time(value) for name, value in item.record.items()}
         for item in corrected.corrections
     ]
     estimates = [
@@ -182,12 +177,6 @@ def _corrected(corrected: Corrected) -> dict[str, Any]:
         "corrections": corrections,
         "estimates": estimates,
     }
-
-
-def _place(event: Event | None) -> dict[str, Any] | None:
-    keys = "time", "name", "direction", "class"
-    values = event and (event.time, event.name, event.direction, event.class_name)
-    return dict(zip(keys, values, strict=True)) if values else None
 
 
 def _is_table(path: Path, kind: str) -> bool:

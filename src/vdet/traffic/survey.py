@@ -316,24 +316,13 @@ class Survey:
 
     def _corrections(self) -> SheetTable:
         """Return every correction."""
-        headings = (
-            "file",
-            "time in the file",
-            "line or zone",
-            "counted as",
-            "class",
-            "right",
-            "class",
-        )
+        headings = "file", "time in the file", *_DIRECTION, "class", "error", "correct"
         rows = list[list[Cell]]()
         for name, counts in self.videos.items():
             for item in counts.corrected.corrections if counts.corrected else ():
-                event = item.counted or item.right
-                assert event
-                sides = (item.counted, item.right)
-                names = [(e.direction, class_of(e)) if e else ("-", None) for e in sides]
-                by_whom = item.reviewer, item.saved
-                rows.append([name, _time(event.time), event.name, *chain(*names), *by_whom])
+                time, *values = item.record.values()
+                cells = (", ".join(v) or None if isinstance(v, list) else v for v in values)
+                rows.append([name, _time(time), *cells])
         return SheetTable([*headings, "reviewer", "saved"], rows)
 
     def notes(self) -> SheetTable:

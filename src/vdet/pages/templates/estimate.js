@@ -76,36 +76,27 @@ function intervalWidths(gains, losses, sample, left, more) {
 /**
  * Estimate the true number of vehicles in each group.
  *
- * counted: Map of the vehicles of each group in each span, also of ALL; strata: the stratum of each span; errors:
- * [{ span, counted, true }] with lists of groups, those in checked spans say what is missed elsewhere; checked, drawn: sets of spans. Returns [{ group, counted, true, low, high,
- * minutesToPrecision }], empty if spans are left and fewer than MIN_CHECKED of the drawn ones are checked.
+ * numbers: a Map of each group, also ALL, to three lists: the vehicles counted in each span, and of all known errors those
+ * missed and those counted wrongly in this group; errors in checked spans say what is missed elsewhere. strata: the stratum of
+ * each span; checked, drawn: sets of spans. Returns [{ group, counted, corrected, true, low, high, minutesToPrecision }], empty
+ * if spans are left and fewer than MIN_CHECKED of the drawn ones are checked.
  */
-function estimateCounts({ counted, strata, errors, checked, drawn }) {
+function estimateCounts({ numbers, strata, checked, drawn }) {
   const spans = strata.map((_, span) => span), unchecked = spans.filter(span => !checked.has(span));
-  const sample = spans.filter(span => checked.has(span) && drawn.has(span));
+  const sample = spans.filter(span => checked.has(span) && drawn.has(span)), traffic = numbers.get(ALL)[0];
   if (unchecked.length > 0 && sample.length < MIN_CHECKED) return [];
-  const none = spans.map(() => 0), traffic = counted.get(ALL);
-  return [...new Set([...counted.keys(), ...errors.flatMap(error => error.true)])].map(group => {
-    const number = counted.get(group) ?? none;
-    const errorsIn = test => {
-      const numbers = spans.map(() => 0);
-      errors.filter(test).forEach(error => numbers[error.span]++);
-      return numbers;
-    };
-    const added = errorsIn(error => error.true.includes(group) && !error.counted.includes(group));
-    const removed = errorsIn(error => error.counted.includes(group) && !error.true.includes(group));
-    const sum = numbers => numbers.reduce((total, number) => total + number, 0);
-    const total = { group, counted: sum(number), corrected: sum(number) + sum(added) - sum(removed) };
-    for (const span of unchecked) added[span] = removed[span] = 0;
-    const known = sum(number) + sum(added) - sum(removed);
+  const sum = list => list.reduce((total, number) => total + number, 0), left = list => sum(unchecked.map(span => list[span]));
+  return [...numbers].map(([group, [each, added, removed]]) => {
+    const counted = sum(each), corrected = counted + sum(added) - sum(removed), known = corrected - left(added) + left(removed);
+    const total = { group, counted, corrected };
     if (unchecked.length === 0) return { ...total, true: known, low: known, high: known, minutesToPrecision: 0 };
-    const size = traffic.map(vehicles => vehicles + 1), limit = sum(unchecked.map(span => number[span]));
-    const gains = uncheckedErrors({ errors: added, size, strata, sample, unchecked, limit: Infinity, unseen: HIDDEN * sum(number) / spans.length });
-    const losses = uncheckedErrors({ errors: removed, size: number, strata, sample, unchecked, limit, unseen: 0 });
+    const size = traffic.map(vehicles => vehicles + 1), unseen = HIDDEN * counted / spans.length;
+    const gains = uncheckedErrors({ errors: added, size, strata, sample, unchecked, limit: Infinity, unseen });
+    const losses = uncheckedErrors({ errors: removed, size: each, strata, sample, unchecked, limit: left(each), unseen: 0 });
     const value = known + gains.number - losses.number;
-    const [below, above] = intervalWidths(gains, losses, sample.length, unchecked.length, 0);
+    const widths = more => intervalWidths(gains, losses, sample.length, unchecked.length, more), [below, above] = widths(0);
     let more = 0;
-    while (more < unchecked.length && sum(intervalWidths(gains, losses, sample.length, unchecked.length, more)) > 2 * PRECISION * value) more++;
+    while (more < unchecked.length && sum(widths(more)) > 2 * PRECISION * value) more++;
     return { ...total, true: value, low: value - below, high: value + above, minutesToPrecision: more };
   });
 }

@@ -276,18 +276,19 @@ function sentence() {
 
 /** Show the estimate of the true count by the checked spans of the sample: of all, by line and direction, and by class. */
 function drawEstimate() {
-  const index = mark => numbers.indexOf(spanOf(mark)), counts = new Map(), errors = [];
+  const table = new Map(), none = () => data.spans.map(() => 0);
   const groups = (mark, direction, name) => [ALL, `${mark.line}, ${direction}`, name];
-  const count = group => counts.get(group) ?? counts.set(group, data.spans.map(() => 0)).get(group);
-  [ALL, ...data.bands.flatMap(band => band.directions.map(direction => `${band.name}, ${direction}`))].forEach(count);
+  const of = group => table.get(group) ?? table.set(group, [none(), none(), none()]).get(group);
+  [ALL, ...data.bands.flatMap(band => band.directions.map(direction => `${band.name}, ${direction}`))].forEach(of);
   for (const mark of allMarks().filter(item => item.band !== null)) {
-    const before = isMissed(mark) ? [] : groups(mark, mark.direction, mark.class);
+    const before = isMissed(mark) ? [] : groups(mark, mark.direction, mark.class), span = numbers.indexOf(spanOf(mark));
     const after = "false" in mark.fixes ? [] : groups(mark, directionOf(mark), classOf(mark));
-    for (const group of before) count(group)[index(mark)]++;
-    if (String(before) !== String(after)) errors.push({ span: index(mark), counted: before, true: after });
+    for (const group of before) of(group)[0][span]++;
+    for (const group of after.filter(name => !before.includes(name))) of(group)[1][span]++;
+    for (const group of before.filter(name => !after.includes(name))) of(group)[2][span]++;
   }
   const indices = list => new Set(list.map(number => numbers.indexOf(number)));
-  const rows = estimateCounts({ counted: counts, strata: data.strata, errors, checked: indices(state.checked),
+  const rows = estimateCounts({ numbers: table, strata: data.strata, checked: indices(state.checked),
     drawn: indices(state.sample?.spans ?? []) });
   const text = row => `${row.group}: ${row.counted} counted, ${row.corrected} corrected, ${Math.round(row.true)} estimated ` +
     `(95 %: ${Math.round(row.low)} to ${Math.round(row.high)})` + (row.minutesToPrecision ? `; ${counted(row.minutesToPrecision, "more span")} for ± 2 %` : "");
