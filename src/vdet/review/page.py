@@ -2,10 +2,10 @@
 
 import tempfile
 from base64 import b64encode
-from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any, Self, TextIO
 from zlib import crc32
@@ -27,14 +27,7 @@ from vdet.pages.render import TEMPLATES, render
 from vdet.review.correcting import correct, covers
 from vdet.review.corrections import MAX_BYTES, Corrections
 from vdet.review.estimate import draw_spans, equal_spans, span_length, strata_of
-from vdet.review.strips import (
-    Band,
-    BandPassage,
-    Passages,
-    Sampling,
-    bands_of,
-    sampling_of,
-)
+from vdet.review.strips import Band, BandPassage, Passages, Sampling, bands_of, sampling_of
 from vdet.review.traces import TraceSearch
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span
@@ -91,13 +84,12 @@ def crop_name(track: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class EventMark:
-    """A counted event: number of the band, seconds from the first frame, position from 0 to 1.
+    """A counted event: number of the band, position from 0 to 1.
 
     What appears or vanishes inside a zone is in no band.
     """
 
     band: int | None
-    seconds: float
     position: float
     event: Event
 
@@ -132,23 +124,18 @@ class Review:
     def key(self) -> str:
         """The key of what was checked in the storage of the browser: of the path and the tracks."""
         seen = [astuple(mark) for mark in (*self.marks, *self.added)], self.reviewed
-        return (
-            f"vdet review {valid_text(str(self.video.path.resolve()))} {crc32(repr(seen).encode())}"
-        )
+        path = valid_text(str(self.video.path.resolve()))
+        return f"vdet review {path} {crc32(repr(seen).encode())}"
 
     def data(self) -> dict[str, Any]:
         """Return the values for the script of the page."""
         video, head = self.video, self._head()
         spans = equal_spans(head["start"], head["end"], head["span"], self.counted.spans)
         numbers, starts = list(spans), [start for start, _ in spans.values()]
-        marks = [{**_values(mark), "id": mark.event.id} for mark in self.marks]
-        unlisted = {class_of(mark.event) for mark in (*self.marks, *self.added)} - set(
-            STANDARD_CLASSES
-        )
-        traffic = [0] * len(spans)
-        for mark in self.marks:
-            if mark.band is not None:
-                traffic[max(0, bisect_right(starts, mark.event.time) - 1)] += 1
+        unlisted = {class_of(mark.event) for mark in (*self.marks, *self.added)}
+        unlisted -= {*STANDARD_CLASSES}
+        times = [mark.event.time for mark in self.marks if mark.band is not None]
+        traffic = np.histogram(times, [-inf, *starts[1:], inf])[0]
         seed = crc32(video.path.name.encode("utf-8", "surrogateescape"))
         return {
             "head": head,
@@ -157,13 +144,10 @@ class Review:
             "zones": [zone.name for zone in self.traffic.zones],
             "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],
             "pictures": [asdict(picture) for picture in self.pictures],
-            "marks": marks,
+            "marks": [{**_values(mark), "id": mark.event.id} for mark in self.marks],
             "traces": [asdict(trace) for trace in self.traces],
             "classes": [*STANDARD_CLASSES, *sorted(unlisted)],
-            "spans": [
-                {"number": number, "start": start, "end": end}
-                for number, (start, end) in spans.items()
-            ],
+            "spans": [{"number": n, "start": a, "end": b} for n, (a, b) in spans.items()],
             "strata": strata_of(traffic).tolist(),
             # The seed follows from the name, so nobody can draw until it looks good.
             "order": [numbers[index] for index in draw_spans(traffic, seed)],
@@ -210,7 +194,7 @@ class Review:
 def _values(mark: EventMark) -> dict[str, Any]:
     """Return a mark for the script of the page."""
     event = mark.event
-    place = {"band": mark.band, "seconds": mark.seconds, "position": mark.position}
+    place = {"band": mark.band, "seconds": round(event.time, 3), "position": mark.position}
     names = {"line": event.name, "direction": event.direction, "class": class_of(event)}
     return place | names | {"vehicle": event.vehicle}
 
@@ -231,15 +215,6 @@ def write_review(file: TextIO, review: Review, folder: Path, index: str) -> None
             data = b64encode(path.read_bytes()).decode("ascii")
             file.write(f'<script type="text/plain" id="{path.name}">{data}</script>\n')
     file.write(after)
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class _Spot:
-    """Where the mark of an event may be, and how many `seconds` from it a track passes there."""
-
-    seconds: float
-    band: int | None
-    position: float
 
 
 @dataclass(slots=True)
@@ -405,10 +380,10 @@ class ReviewRecorder:
 
     def _marks(self, events: Sequence[Event]) -> list[EventMark]:
         """Return where the counted events are."""
-        by_band_and_id: dict[tuple[int, int], list[BandPassage]] = defaultdict(list)
+        passed = defaultdict[tuple[int, int], list[BandPassage]](list)
         for number, passages in enumerate(self._passages.by_band):
             for passage in passages:
-                by_band_and_id[number, passage.id].append(passage)
+                passed[number, passage.id].append(passage)
         marks = []
         for event in events:
             bands = [
@@ -416,13 +391,9 @@ class ReviewRecorder:
                 for number, strip in enumerate(self._strips)
                 if strip.band.name == event.name and event.direction in strip.band.directions
             ]
-            spots = [
-                _Spot(abs(passage.time - event.time), band, passage.position)
-                for band in bands
-                for passage in by_band_and_id.get((band, event.id), ())
-            ]
-            spots += [_Spot(_SAME, band, 0.5) for band in bands]  # if there is no passage
-            spot = min(spots, default=_Spot(0.0, None, 0.5))
-            seconds = round(event.time, 3)
-            marks.append(EventMark(spot.band, seconds, round(spot.position, 3), event))
+            near = ((band, passage) for band in bands for passage in passed[band, event.id])
+            spots = [(abs(p.time - event.time), band, p.position) for band, p in near]
+            spots += [(_SAME, band, 0.5) for band in bands]  # if there is no passage
+            _, band, position = min(spots, default=(0.0, None, 0.5))
+            marks.append(EventMark(band, round(position, 3), event))
         return marks
