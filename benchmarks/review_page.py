@@ -68,7 +68,9 @@ const keyOf = name => String(data.classes.indexOf(name) + 1);
 const painted = () => new Promise(done => requestAnimationFrame(() => setTimeout(done)));
 
 async function shown() {
-  for (const strip of data.pictures.filter(picture => picture.minute === minute)) {
+  const { start, end } = spanAt(current);
+  const isShown = ({ minute }) => 60 * minute < end && 60 * minute + 60 > start;
+  for (const strip of data.pictures.filter(isShown)) {
     const image = new Image();
     image.src = addressOf(`strip-${strip.band}-${strip.minute}`);
     await image.decode();
@@ -88,7 +90,7 @@ async function press(key) {
 /** Click at a point of the window if it hits the element; return whether it does. */
 function click(element, clientX, clientY) {
   const target = document.elementFromPoint(clientX, clientY);
-  if (target !== element && target?.closest(".mark, .column") !== element) return false;
+  if (target !== element && target?.closest(".mark, .column > i") !== element) return false;
   target.dispatchEvent(new MouseEvent("click", { clientX, clientY, bubbles: true }));
   taken++;
   return true;
@@ -106,24 +108,22 @@ async function select(id) {
 }
 
 async function add(error) {
-  const picture = data.pictures.find(item => item.minute === minute);
-  for (const seconds of [0, 0.05, -0.05, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3]) {
-    const along = (error.seconds + seconds - 60 * minute) / picture.seconds;
-    const column = document.querySelectorAll(".column")[Math.floor(along)];
-    if (!column) continue;
-    column.scrollIntoView({ block: "center" });
-    const box = column.getBoundingClientRect(), down = along % 1;
-    const y = box.top + (picture.is_upward ? 1 - down : down) * box.height;
-    if (click(column, box.left + error.position * box.width, y)) break;
-  }
+  const picture = data.pictures.find(({ minute }) => minute === Math.floor(error.seconds / 60));
+  const number = Math.floor((error.seconds - 60 * picture.minute) / picture.seconds);
+  const at = `[data-at="${picture.band} ${picture.minute} ${number}"]`;
+  const view = document.querySelector(`${at} > i`);
+  const { x, y } = placeIn(picture, number, error.seconds, error.position);
+  scrollBy(0, view.getBoundingClientRect().top + y * view.offsetHeight - innerHeight / 2);
+  const box = view.getBoundingClientRect();
+  click(view, box.left + x * box.width, box.top + y * box.height);
   if (classOf(selectedMark()) !== error.class) await press(keyOf(error.class));
   if (directionOf(selectedMark()) !== error.direction) await press("d");
 }
 
 await shown();
 const view = performance.now(), each = {}, empty = [];
-for (const number of data.minutes) {
-  const errors = ERRORS_OF_HOUR.filter(error => Math.floor(error.seconds / 60) === number);
+for (const { start, end } of data.spans) {
+  const errors = ERRORS_OF_HOUR.filter(error => error.seconds >= start && error.seconds < end);
   for (const error of errors) {
     taken = 0;
     if (error.kind === "missed") await add(error);

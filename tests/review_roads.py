@@ -56,8 +56,12 @@ def draw_road(
     missed: int | None = None,
     seconds: int,
     settings: str = GATE,
+    is_side_on: bool = False,
 ) -> Road:
-    """Draw cars; the tracks lack the one with the number `missed`."""
+    """Draw cars; the tracks lack the one with the number `missed`.
+
+    With `is_side_on` their feet are `x` pixels from the top, and cross the middle to the right.
+    """
     road = Road(folder / "in.mp4", folder / "tracks.txt", folder / "gate.yaml")
     road.settings.write_text(settings)
     rows = []
@@ -69,7 +73,9 @@ def draw_road(
             image = np.full((HEIGHT, WIDTH, 3), 110, np.uint8)
             for number, car in enumerate(cars):
                 foot, left = round(car.foot(index / RATE)), car.x - CAR // 2
-                if CAR <= foot < HEIGHT:
+                if is_side_on:
+                    foot, left = car.x, foot + WIDTH // 2 - LINE_Y - CAR // 2
+                if CAR <= foot < HEIGHT and 0 <= left <= WIDTH - CAR:
                     image[foot - CAR : foot, left : left + CAR] = 30, 30, 220
                     if number != missed:
                         box = f"{left},{foot - CAR},{CAR},{CAR}"
@@ -80,10 +86,10 @@ def draw_road(
     return road
 
 
-def write_review(run: Run, folder: Path, road: Road) -> Path:
+def write_review(run: Run, folder: Path, road: Road, *options: str) -> Path:
     """Write the page of a road by `vdet review`, and return its path."""
     output, saved = folder / "review", ("--tracks-from", road.tracks)
-    run("review", road.video, *saved, "-c", road.settings, "-o", output, code=0)
+    run("review", road.video, *saved, "-c", road.settings, "-o", output, *options, code=0)
     return output / "review.html"
 
 
@@ -102,11 +108,12 @@ class Page:
         """Return seconds and position of the middle of each red streak, in order of time."""
         [layout] = [item for item in self.data["pictures"] if item["minute"] == minute]
         picture = self.pictures[minute]
+        rows_a_second = layout["rows"] / (layout["seconds"] + layout["lead"])
         columns = np.split(picture, layout["columns"], axis=1)
-        strip = np.concatenate(columns).astype(int)  # time runs down
+        width, lead = picture.shape[1] / len(columns), round(layout["lead"] * rows_a_second)
+        strip = np.concatenate([column[lead:] for column in columns]).astype(int)  # time runs down
         red = (strip[..., 2] - strip[..., 1] > 80).astype(np.uint8)
         _, _, stats, middles = cv2.connectedComponentsWithStats(red)
-        rows_a_second, width = layout["height"] / layout["seconds"], picture.shape[1] / len(columns)
         areas = zip(stats.tolist()[1:], middles.tolist()[1:], strict=True)
         return sorted(
             (60 * minute + y / rows_a_second, x / width) for (*_, area), (x, y) in areas if area > 9

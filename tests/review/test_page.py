@@ -1,16 +1,21 @@
 """The page of reviews in a real browser: check, correct, save, reload."""
 
+import re
+from base64 import b64decode
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from zlib import crc32
 
+import numpy as np
 import pytest
 import yaml
 
 from browser import ENTER, Browser, browser, downloaded
 from conftest import Run
-from review_roads import Car, draw_road, write_review
+from review_roads import CAR, GATE, Car, draw_road, read_page, write_review
+from vdet.media.images import decode_image
 
 CARS = [Car(3, 80), Car(3.6, 240, goes_up=False), Car(8, 100), Car(64, 80)]
 TAB = "\ue004"
@@ -32,11 +37,11 @@ def click_at(window: Browser, seconds: float, position: float) -> None:
         "const [seconds, position] = arguments;"
         "const item = data.pictures.find(p => p.minute === Math.floor(seconds / 60));"
         "const number = Math.floor((seconds % 60) / item.seconds);"
-        "const column = document.querySelector(`[data-at='0 ${item.minute} ${number}']`);"
-        "const box = column.getBoundingClientRect();"
-        "let y = (seconds % 60) / item.seconds - number; if (item.is_upward) y = 1 - y;"
-        "column.dispatchEvent(new MouseEvent('click', { bubbles: true,"
-        " clientX: box.left + position * box.width, clientY: box.top + y * box.height }));",
+        "const view = document.querySelector(`[data-at='0 ${item.minute} ${number}'] i`);"
+        "const box = view.getBoundingClientRect();"
+        "const { x, y } = placeIn(item, number, seconds, position);"
+        "view.dispatchEvent(new MouseEvent('click', { bubbles: true,"
+        " clientX: box.left + x * box.width, clientY: box.top + y * box.height }));",
         seconds,
         position,
     )
@@ -161,3 +166,88 @@ def test_a_sample_is_drawn_and_gives_an_estimate_of_the_true_count(window: Brows
     )
     values = saved(window)
     assert values["sample"] == {"seed": crc32(b"in.mp4"), "spans": [first, second]}
+
+
+OVERLAPS = """
+    const boxes = name => [...document.querySelectorAll(name)].map(e => e.getBoundingClientRect());
+    const meet = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&
+      Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+    const marks = boxes(".mark"), views = boxes(".column > i");
+    const isOver = (mark, i) => marks.some((other, j) => j > i && meet(mark, other));
+    return { marks: marks.length, "over marks": marks.filter(isOver).length,
+      "over vehicles": marks.filter(mark => views.some(view => meet(mark, view))).length,
+      side: Math.min(...views.map(view => view[arguments[0]])), fits:
+      document.documentElement.scrollWidth <= document.documentElement.clientWidth };
+"""
+
+
+@pytest.mark.parametrize("width", [1280, 1920])
+@pytest.mark.parametrize("way", ["up", "right"])
+def test_marks_cover_neither_vehicles_nor_one_another(
+    tmp_path: Path, run: Run, way: str, width: int
+) -> None:
+    """Thirty cars in a minute, half of them within three seconds."""
+    times = [3 + 0.2 * n for n in range(15)] + [8 + 3 * n for n in range(15)]
+    cars = [Car(time, 60 + 80 * (n % 3), goes_up=False) for n, time in enumerate(times)]
+    upright = GATE.replace("[20, 120], end: [300, 120]", "[160, 239], end: [160, 1]")
+    settings, is_side_on = (upright if way == "right" else GATE), way == "right"
+    road = draw_road(tmp_path, cars, seconds=60, settings=settings, is_side_on=is_side_on)
+    page = write_review(run, tmp_path, road)
+    with browser(tmp_path, width, 1000) as window:
+        window.open(page)
+        assert window.run("return data.pictures.map(picture => picture.way)") == [way]
+        found = window.run(OVERLAPS, "height" if is_side_on else "width")
+        assert 400 <= found.pop("side") <= 800
+        assert found == {"marks": 30, "over marks": 0, "over vehicles": 0, "fits": True}
+        places = window.run(
+            "const [item] = data.pictures; return data.marks.map(({ seconds, position }) => {"
+            " const number = Math.floor(seconds / item.seconds);"
+            " return { number, ...placeIn(item, number, seconds, position) }; });"
+        )
+    picture = read_page(page).pictures[0].astype(int)
+    columns = np.split(picture, picture.shape[0] // 238 if is_side_on else 1)
+    for place in places if is_side_on else ():
+        column = columns[place["number"]]
+        height, across = column.shape[:2]
+        above = column[round(place["y"] * height) - CAR // 2, round(place["x"] * across)]
+        assert above[2] > above[1] + 80, "it stands upright above its foot"
+
+
+def test_a_doubtful_mark_shows_its_frame_with_box_line_and_path(tmp_path: Path, run: Run) -> None:
+    road = draw_road(tmp_path, CARS[:2], seconds=12)
+    unsure = (
+        line.replace(",0.9,", ",0.5,") if line.split(",")[1] == "1" else line
+        for line in road.tracks.read_text().splitlines()
+    )
+    road.tracks.write_text("\n".join(unsure))
+    page = write_review(run, tmp_path, road, "--set", "input.begin=2026-05-01T07:00:00")
+    with browser(tmp_path) as window:
+        window.open(page)
+        assert window.text("#minute") == "7:00:00 to 7:00:12"
+        times = window.run("return [...document.querySelectorAll('small')].map(e => e.innerText)")
+        assert times[:3] == ["7:00:00", "7:00:10", "7:00:10"], "at the ends of columns"
+        shown = "return [...document.querySelectorAll('#details .moment')].map(e => e.naturalWidth)"
+        window.type(TAB)
+        assert window.run(shown) == [320]
+        window.type(TAB)
+        assert window.run(shown) == []
+        assert window.run("return document.getElementById('scene').naturalWidth") == 320
+    [data] = re.findall(r'id="moment-0-1-[^"]*">([^<]*)<', page.read_text("utf-8"))
+    image = decode_image(b64decode(data))
+    assert image is not None
+    blue, green, red = np.moveaxis(image[:, 40:120].astype(int), 2, 0)
+    is_green, is_red = green - np.maximum(red, blue) > 20, red - np.maximum(green, blue) > 60
+    assert is_green[130:200].any(), "its path"
+    assert is_green[92:116, 24:32].any(), "the left side of its box"
+    assert is_red[90:120].any()
+
+
+def test_a_column_repeats_the_end_of_the_one_before(window: Browser) -> None:
+    """The car at 3 s is drawn at 3 s of a column; half a second is repeated at its start."""
+    page = read_page(window.folder / "review/review.html")
+    [layout, _] = page.data["pictures"]
+    columns = np.split(page.pictures[0].astype(int), layout["columns"], axis=1)
+    rows = round(layout["lead"] * layout["rows"] / (layout["seconds"] + layout["lead"]))
+    assert layout["lead"] == 0.5
+    for before, column in pairwise(columns):
+        assert np.abs(before[-rows:] - column[:rows]).mean() < 8

@@ -7,23 +7,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Any, Self, TextIO
+from typing import Any, Literal, Self, TextIO
 from zlib import crc32
 
 import cv2
 import numpy as np
 from markupsafe import Markup
 
-from vdet.boxes import Image
+from vdet.boxes import Box, Image
 from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.scene import TrafficSettings
 from vdet.config.schema import Settings
+from vdet.draw import boxes
 from vdet.files import valid_text
 from vdet.findings import Finding
 from vdet.media import Picture, VideoInfo
 from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
-from vdet.pages.render import TEMPLATES, render
+from vdet.pages.render import TEMPLATES, render, thumbnail
+from vdet.pages.traffic import scene_picture
 from vdet.review.correcting import correct, covers
 from vdet.review.corrections import MAX_BYTES, Corrections
 from vdet.review.estimate import draw_spans, equal_spans, span_length, strata_of
@@ -43,8 +45,16 @@ _ENOUGH = 6
 """Number of passages after which the sampling of a band is final."""
 _COLUMN_ROWS = 800
 """Approximate height of the columns that a strip is cut into, pixels."""
-_CROP_SIDE = 120
-"""Maximum side of the picture of a vehicle, pixels."""
+_REPEATED = 0.5
+"""Seconds of a column that the next one repeats."""
+_SCENE_WIDTH, _MOMENT_WIDTH = 480, 320
+"""Widths of the picture of the scene and of the frames of doubtful marks, pixels."""
+_UNSURE = 0.6
+"""Score of a track below which its mark is doubtful."""
+_BESIDE = 2.0
+"""Seconds from a trace within which marks at the line are doubtful."""
+_MOMENTS = 200
+"""Maximum number of frames of doubtful marks in an hour."""
 _QUALITY = 60
 _SAME = 1.0
 """Maximum seconds between a counted crossing and the passage that gives its position."""
@@ -58,18 +68,23 @@ class StripPicture:
     ----------
     band, minute
         Numbers from 0.
-    columns, seconds, height
+    columns, seconds, rows
         Number of columns, seconds of each, and rows of each, pixels. Time runs down.
-    is_upward
-        Whether the page should turn it, so that time runs up.
+    way
+        Where time runs in the page so that vehicles stand upright: "up", if the page should turn
+        it, "down", or "right": its columns lie on their sides below one another, the top of the
+        frame at the top.
+    lead
+        Seconds at the start of a column which repeat the end of the one before.
     """
 
     band: int
     minute: int
     columns: int
     seconds: int
-    height: int
-    is_upward: bool
+    rows: int
+    way: Literal["up", "down", "right"]
+    lead: float
 
     @property
     def name(self) -> str:
@@ -82,16 +97,22 @@ def crop_name(track: int) -> str:
     return f"crop-{track}"
 
 
+def _moment_name(band: int, passage: BandPassage) -> str:
+    """Return the name in the page of the frame in which a vehicle passes a band."""
+    return f"moment-{band}-{passage.id}-{passage.time:.3f}"
+
+
 @dataclass(frozen=True, slots=True)
 class EventMark:
-    """A counted event: number of the band, position from 0 to 1.
+    """A counted event: number of the band, position from 0 to 1, name of the picture of its frame.
 
-    What appears or vanishes inside a zone is in no band.
+    What appears or vanishes inside a zone is in no band, and has no picture.
     """
 
     band: int | None
     position: float
     event: Event
+    moment: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +142,23 @@ class Review:
     added: Sequence[EventMark] = ()
 
     @property
+    def moments(self) -> list[str]:
+        """The names of the frames of doubtful marks: unsure, beside a trace, or corrected."""
+        corrected = {item.counted for item in self.opened.corrections} if self.opened else set()
+
+        def score(mark: EventMark) -> float:
+            return 1.0 if mark.event.score is None else mark.event.score
+
+        def is_doubtful(mark: EventMark) -> bool:
+            traces = (trace for trace in self.traces if trace.band == mark.band)
+            is_beside = any(abs(trace.time - mark.event.time) < _BESIDE for trace in traces)
+            return is_beside or score(mark) < _UNSURE or mark.event in corrected
+
+        hours = 1 + int(self.counted.spans[-1][1] // 3600)
+        doubtful = sorted(filter(is_doubtful, self.marks), key=score)
+        return [mark.moment for mark in doubtful if mark.moment][: _MOMENTS * hours]
+
+    @property
     def key(self) -> str:
         """The key of what was checked in the storage of the browser: of the path and the tracks."""
         seen = [astuple(mark) for mark in (*self.marks, *self.added)], self.reviewed
@@ -130,6 +168,7 @@ class Review:
     def data(self) -> dict[str, Any]:
         """Return the values for the script of the page."""
         video, head = self.video, self._head()
+        clock = self.counted.clock and self.counted.clock.at(0.0)
         spans = equal_spans(head["start"], head["end"], head["span"], self.counted.spans)
         numbers, starts = list(spans), [start for start, _ in spans.values()]
         unlisted = {class_of(mark.event) for mark in (*self.marks, *self.added)}
@@ -141,10 +180,13 @@ class Review:
             "head": head,
             "limit": MAX_BYTES,
             "key": self.key,
+            "clock": clock and 3600 * clock.hour + 60 * clock.minute + clock.second,
             "zones": [zone.name for zone in self.traffic.zones],
             "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],
             "pictures": [asdict(picture) for picture in self.pictures],
-            "marks": [{**_values(mark), "id": mark.event.id} for mark in self.marks],
+            "marks": [
+                {**_values(mark), "id": mark.event.id, "moment": mark.moment} for mark in self.marks
+            ],
             "traces": [asdict(trace) for trace in self.traces],
             "classes": [*STANDARD_CLASSES, *sorted(unlisted)],
             "spans": [{"number": n, "start": a, "end": b} for n, (a, b) in spans.items()],
@@ -209,8 +251,9 @@ def write_review(file: TextIO, review: Review, folder: Path, index: str) -> None
     page = render("review.html", scripts=scripts, **values)
     before, _, after = page.partition(_PICTURES)
     file.write(before)
-    crops = {crop_name(mark.event.id) for mark in review.marks}
-    for path in (folder / name for name in (*(p.name for p in review.pictures), *sorted(crops))):
+    crops = sorted({crop_name(mark.event.id) for mark in review.marks})
+    names = "scene-picture", *(item.name for item in review.pictures), *crops, *review.moments
+    for path in (folder / name for name in names):
         if path.exists():
             data = b64encode(path.read_bytes()).decode("ascii")
             file.write(f'<script type="text/plain" id="{path.name}">{data}</script>\n')
@@ -219,15 +262,17 @@ def write_review(file: TextIO, review: Review, folder: Path, index: str) -> None
 
 @dataclass(slots=True)
 class _Strip:
-    """The strip of a band in the current minute, whose frames have their seconds in it.
+    """The strip of a band in the current minute, whose frames have their times.
 
-    The frames before the first passages have a single row, and are stretched.
+    `before` has those at the end of the minute before. The frames before the first passages have a
+    single row, and are stretched.
     """
 
     band: Band
     search: TraceSearch
     sampling: Sampling
     rows: list[tuple[float, Image]] = field(default_factory=list)
+    before: list[tuple[float, Image]] = field(default_factory=list)
     passed: int = 0
 
     def add(self, seconds: float, picture: Picture, passages: list[BandPassage]) -> None:
@@ -263,6 +308,7 @@ class ReviewRecorder:
         self._folder = tempfile.TemporaryDirectory()
         self._pictures: list[StripPicture] = []
         self._minute = 0
+        self._has_scene = False
         self._coding: Coding | None = None
 
     def __enter__(self) -> Self:
@@ -273,14 +319,21 @@ class ReviewRecorder:
 
     def add(self, frame: FrameTracks, selected: FrameTracks, picture: Picture) -> None:
         """Add a frame, with its tracks, and those of the selected classes."""
+        if not self._has_scene:
+            self._write_scene(picture.image)
         if (minute := int(frame.time // _MINUTE)) != self._minute:
             self._end_minute(is_end=False)
             self._minute = minute
         self._coding = picture.planes.coding if picture.planes else None
         self._tracks.append(frame)
+        passed = list(map(len, self._passages.by_band))
         self._passages.add(frame)
-        for strip, passages in zip(self._strips, self._passages.by_band, strict=True):
-            strip.add(frame.time - _MINUTE * minute, picture, passages)
+        for number, (strip, passages) in enumerate(
+            zip(self._strips, self._passages.by_band, strict=True)
+        ):
+            strip.add(frame.time, picture, passages)
+            for passage in passages[passed[number] :]:
+                self._write_moment(number, passage, frame, picture.image)
         self._write_crops(self._crops.add(selected, picture))
 
     def end(self) -> tuple[Trace, ...]:
@@ -337,26 +390,36 @@ class ReviewRecorder:
                 self._write_minute(number, strip)
                 rows = [rows for _, rows in strip.rows]
                 self._traces += strip.search.search(self._tracks, rows, passages, is_end=is_end)
+            strip.before = [item for item in strip.rows if item[0] >= strip.rows[-1][0] - 1]
             strip.rows = []
         self._tracks = []
 
     def _write_minute(self, number: int, strip: _Strip) -> None:
         sampling = strip.sampling
         rate = sampling.rows * float(self._video.rate)  # rows a second
-        last = strip.rows[-1][0]
+        lead = float(round(_REPEATED * self._video.rate) / self._video.rate)  # whole frames
+        begin = _MINUTE * self._minute
+        last = strip.rows[-1][0] - begin
         seconds = min(max(1, round(_COLUMN_ROWS / rate)), int(last) + 1)
-        columns, height = int(last // seconds) + 1, int(np.ceil(seconds * rate))
+        columns, height = int(last // seconds) + 1, int(np.ceil((seconds + lead) * rate))
         image = np.full((height, columns, strip.band.samples, 3), 128, np.uint8)
-        for time, rows in strip.rows:
-            column, top = int(time // seconds), round(time % seconds * rate)
+        for time, rows in (*strip.before, *strip.rows):
             stretched = rows[np.arange(sampling.rows) * len(rows) // sampling.rows]
-            part = stretched[: height - top]
-            image[top : top + len(part), column] = part
+            ends = time - begin, time - begin + lead
+            for column in {int(end // seconds) for end in ends} & {*range(columns)}:
+                top = round((ends[1] - column * seconds) * rate)
+                part = stretched[: height - top]
+                image[top : top + len(part), column] = part
+        way: Literal["up", "down", "right"] = "up" if sampling.is_upward else "down"
         flat = image.reshape(height, -1, 3)
+        if strip.band.is_upright:
+            way, is_down = "right", strip.band.start[1] < strip.band.end[1]
+            across = image[:, :, :: 1 if is_down else -1].transpose(1, 2, 0, 3)
+            flat = across.reshape(-1, height, 3)
         if self._coding:
             luma, blue, red = (np.ascontiguousarray(layer) for layer in np.moveaxis(flat, 2, 0))
             flat = self._coding.to_bgr((luma, blue, red))
-        picture = StripPicture(number, self._minute, columns, seconds, height, sampling.is_upward)
+        picture = StripPicture(number, self._minute, columns, seconds, height, way, lead)
         self._pictures.append(picture)
         self._write(picture.name, self._shown(flat, number))
 
@@ -371,8 +434,33 @@ class ReviewRecorder:
 
     def _write_crops(self, crops: Sequence[Crop]) -> None:
         for crop in crops:
-            scale = _CROP_SIDE / max(crop.image.shape)
-            self._write(crop_name(crop.id), shrunk(crop.image, scale))
+            (Path(self._folder.name) / crop_name(crop.id)).write_bytes(thumbnail(crop.image))
+
+    def _write_scene(self, image: Image) -> None:
+        self._has_scene = True
+        small = self._reduced(image, _SCENE_WIDTH, largest=0)
+        self._write("scene-picture", scene_picture(small, self._settings.traffic, ()))
+
+    def _write_moment(
+        self, number: int, passage: BandPassage, frame: FrameTracks, image: Image
+    ) -> None:
+        """Write a frame in which a vehicle passes a line, with its box, the line and its path."""
+        sides = (side for t in frame.tracks for side in (t.box.width, t.box.height))
+        small = self._reduced(image, _MOMENT_WIDTH, largest=max(sides)).copy()
+        tracks = [t for item in self._tracks for t in item.tracks if t.id == passage.id]
+        band, box = self._strips[number].band, tracks[-1].box
+        scale = small.shape[1] / image.shape[1]
+        feet = [track.foot for track in tracks]
+        for points, color in (((band.start, band.end), boxes.LINE), (feet, boxes.GREEN)):
+            boxes.draw_lines(small, [(scale * x, scale * y) for x, y in points], color, 1)
+        corners = (scale * side for side in (box.x1, box.y1, box.x2, box.y2))
+        boxes.draw_box(small, Box(*corners), boxes.GREEN)
+        self._write(_moment_name(number, passage), small)
+
+    def _reduced(self, image: Image, width: int, largest: float) -> Image:
+        """Return an image of a width at most, as `output.coarse` allows; `largest` is a vehicle."""
+        scale = coarse_scale(largest, len(image)) if self._settings.output.coarse else 1.0
+        return shrunk(image, min(scale, width / image.shape[1]))
 
     def _write(self, name: str, image: Image) -> None:
         _, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
@@ -392,8 +480,11 @@ class ReviewRecorder:
                 if strip.band.name == event.name and event.direction in strip.band.directions
             ]
             near = ((band, passage) for band in bands for passage in passed[band, event.id])
-            spots = [(abs(p.time - event.time), band, p.position) for band, p in near]
-            spots += [(_SAME, band, 0.5) for band in bands]  # if there is no passage
-            _, band, position = min(spots, default=(0.0, None, 0.5))
-            marks.append(EventMark(band, round(position, 3), event))
+            spots = [
+                (abs(p.time - event.time), band, p.position, _moment_name(band, p))
+                for band, p in near
+            ]
+            spots += [(_SAME, band, 0.5, "") for band in bands]  # if there is no passage
+            _, band, position, moment = min(spots, default=(0.0, None, 0.5, ""))
+            marks.append(EventMark(band, round(position, 3), event, moment))
         return marks

@@ -56,6 +56,11 @@ class Band:
         return float(np.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1]))
 
     @property
+    def is_upright(self) -> bool:
+        """Whether it lies at the side of the traffic rather than across it."""
+        return abs(self.end[1] - self.start[1]) > abs(self.end[0] - self.start[0])
+
+    @property
     def samples(self) -> int:
         """Number of columns of its strip."""
         return int(np.clip(round(self.length), *_SAMPLES))

@@ -125,45 +125,75 @@ function go(steps, isChecked) {
 
 // ---------------------------------------------------------------- the view
 const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
-const clock = seconds => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(0).padStart(2, "0")}`;
+/** Return a time in the video, or of its clock. */
+function clock(seconds) {
+  const time = Math.round(seconds + (data.clock ?? 0)), pad = number => String(number).padStart(2, "0"), minutes = Math.floor(time / 60);
+  const hours = Math.floor(minutes / 60) % (data.clock === null ? Infinity : 24);
+  return `${hours || data.clock !== null ? `${hours}:${pad(minutes % 60)}` : minutes}:${pad(time % 60)}`;
+}
 
-function element(tag, className, text) {
+function element(tag, className, ...children) {
   const node = document.createElement(tag);
   if (className) node.className = className;
-  if (text !== undefined) node.textContent = text;
+  node.append(...children);
   return node;
 }
 
 /** Return the address of a picture in the page. */
 const addressOf = name => `data:image/webp;base64,${get(name).textContent}`;
 
+const LEAST = 400, MOST = 640; // pixels of a line on the screen, if the window is wide enough
+const GAP = 12, MARGIN = 92, LABEL = 18; // between columns; beside a strip, for labels; height of a label
+
+/** Return how large the picture of a column is; `number` is that of all columns. */
+function sizeOf(picture, number) {
+  const across = data.bands[picture.band].samples, room = get("strips").clientWidth;
+  if (picture.way === "right") return { width: room, height: Math.max(LEAST, Math.round(across * room / picture.rows)) };
+  const beside = Math.max(1, Math.min(number, Math.floor((room + GAP) / (LEAST + MARGIN + GAP))));
+  const width = Math.min(MOST, Math.floor((room - (beside - 1) * GAP) / beside) - MARGIN);
+  return { width, height: Math.round(picture.rows * width / across) };
+}
+
+/** Return where a time is in a column of a picture, and a position along the line: from 0 to 1, from the left and the top. */
+function placeIn({ band, way, minute, seconds, lead }, number, time, position) {
+  const { start, end } = data.bands[band], along = (time - MINUTE * minute - number * seconds + lead) / (seconds + lead);
+  if (way === "right") return { x: along, y: start[1] < end[1] ? position : 1 - position };
+  return { x: position, y: way === "up" ? 1 - along : along };
+}
+
+/** Return the time and the position at a point of a column, the reverse of `placeIn`. */
+function pointIn({ band, way, minute, seconds, lead }, number, x, y) {
+  const { start, end } = data.bands[band], along = way === "right" ? x : way === "up" ? 1 - y : y;
+  const position = way !== "right" ? x : start[1] < end[1] ? y : 1 - y;
+  return { time: MINUTE * minute + number * seconds - lead + along * (seconds + lead), position: rounded(position) };
+}
+
 /** Show the strips of the span; only its pictures are decoded. */
 function drawStrips() {
   const { start, end } = spanAt(current);
   const isShown = (from, seconds) => from < end && from + seconds > start;
-  const strips = data.pictures.filter(picture => isShown(MINUTE * picture.minute, MINUTE)).map(picture => {
-    const band = data.bands[picture.band], strip = element("div", "strip"), columns = element("div", "columns");
-    const width = Number(get("size").value), height = picture.height * width / band.samples; // of a column, screen pixels
+  const columnsOf = ({ columns, minute, seconds }) => [...Array(columns).keys()].filter(number => isShown(MINUTE * minute + number * seconds, seconds));
+  const pictures = data.pictures.filter(picture => columnsOf(picture).length), every = pictures.flatMap(columnsOf).length;
+  const strips = pictures.map(picture => {
+    const band = data.bands[picture.band], strip = element("div", "strip"), columns = element("div", `columns ${picture.way}`);
+    const { width, height } = sizeOf(picture, every), isRight = picture.way === "right";
     const address = `url("${addressOf(`strip-${picture.band}-${picture.minute}`)}")`;
-    for (let number = 0; number < picture.columns; number++) {
-      const from = MINUTE * picture.minute + number * picture.seconds;
-      if (!isShown(from, picture.seconds)) continue;
-      const column = element("div", picture.is_upward ? "column up" : "column"), view = element("i");
+    for (const number of columnsOf(picture)) {
+      const from = MINUTE * picture.minute + number * picture.seconds, view = element("i", "", element("b"));
+      const column = element("div", "column", element("small", "", clock(from)), view, element("small", "", clock(from + picture.seconds)));
       column.dataset.at = `${picture.band} ${picture.minute} ${number}`;
-      Object.assign(column.style, { width: `${width}px`, height: `${height}px` });
-      Object.assign(view.style, { backgroundImage: address, backgroundPosition: `${-number * width}px 0`,
-        backgroundSize: `${picture.columns * width}px ${height}px` });
-      column.append(view, element("small", "", clock(from)));
-      column.onclick = event => {
-        if (event.target.closest(".mark")) return;
-        const box = column.getBoundingClientRect(), down = (event.clientY - box.top) / box.height;
-        const along = picture.is_upward ? 1 - down : down;
-        addMissed(picture.band, from + along * picture.seconds,
-          Math.round(1000 * (event.clientX - box.left) / box.width) / 1000);
+      Object.assign(view.style, { width: `${width}px`, height: `${height}px`, backgroundImage: address,
+        backgroundPosition: isRight ? `0 ${-number * height}px` : `${-number * width}px 0`,
+        backgroundSize: isRight ? `${width}px ${picture.columns * height}px` : `${picture.columns * width}px ${height}px` });
+      view.style.setProperty("--lead", `${100 * picture.lead / (picture.seconds + picture.lead)}%`);
+      view.onclick = event => {
+        const box = view.getBoundingClientRect();
+        const { time, position } = pointIn(picture, number, (event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+        if (time >= from) addMissed(picture.band, time, position); // else it is in the column before
       };
       columns.append(column);
     }
-    strip.append(element("h2", "", `${band.name}${picture.is_upward ? " (time runs upwards)" : ""}`), columns);
+    strip.append(element("h2", "", `${band.name} (time runs ${{ right: "from left to right", up: "upwards", down: "down" }[picture.way]})`), columns);
     return strip;
   });
   get("strips").replaceChildren(...strips);
@@ -183,15 +213,17 @@ const tracesInSpan = () => data.traces.map(trace => ({ ...trace, seconds: trace.
   spanOf(trace) === current && !state.missed.some(mark => mark.band === trace.band
     && Math.abs(mark.seconds - trace.seconds) < 1 && Math.abs(mark.position - trace.position) < 0.1));
 
+/** Show marks in margins beside the strips, where none covers another or a vehicle, with thin lines to the feet. */
 function drawMarks() {
-  for (const node of document.querySelectorAll(".mark")) node.remove();
+  for (const node of document.querySelectorAll(".mark, .feet")) node.remove();
+  const columns = new Map();
   for (const mark of [...tracesInSpan(), ...inSpan()]) {
     const minute = Math.floor(mark.seconds / MINUTE), isTrace = !mark.key;
     const picture = data.pictures.findLast(item => item.band === mark.band && item.minute <= minute);
-    const kinds = isTrace ? ["trace"] : Object.keys(mark.fixes);
-    const button = element("button", ["mark", ...kinds, mark.key && mark.key === selected ? "selected" : ""].join(" "), isTrace ? "?" : labelOf(mark));
+    const kinds = [...(isTrace ? ["trace"] : Object.keys(mark.fixes)), mark.key && mark.key === selected ? "selected" : ""].join(" ");
+    const button = element("button", `mark ${kinds}`, isTrace ? "? trace" : labelOf(mark));
     if (!isTrace) button.dataset.key = mark.key;
-    button.title = `${mark.seconds.toFixed(2)} s, ${isTrace ? "a trace without a vehicle: click to add one" : mark.direction}`;
+    button.title = `${clock(mark.seconds)}, ${isTrace ? "a trace without a vehicle: click to add one" : `${classOf(mark)}, ${directionOf(mark)}`}`;
     button.onclick = () => {
       if (isTrace) return addMissed(mark.band, mark.seconds, mark.position);
       selected = mark.key;
@@ -201,11 +233,43 @@ function drawMarks() {
       get("inside").append(button);
       continue;
     }
-    const along = (mark.seconds - MINUTE * picture.minute) / picture.seconds;
-    const column = Math.min(Math.floor(along), picture.columns - 1), down = along - column;
-    Object.assign(button.style, { left: `clamp(36px, ${100 * mark.position}%, calc(100% - 36px))`, top: `${100 * (picture.is_upward ? 1 - down : down)}%` });
-    document.querySelector(`[data-at="${picture.band} ${picture.minute} ${column}"]`)?.append(button);
+    const number = Math.min(Math.floor((mark.seconds - MINUTE * picture.minute) / picture.seconds), picture.columns - 1);
+    const column = document.querySelector(`[data-at="${picture.band} ${picture.minute} ${number}"]`);
+    if (column) columns.set(column, [...columns.get(column) ?? [], { button, kinds, ...placeIn(picture, number, mark.seconds, mark.position) }]);
   }
+  for (const [column, marks] of columns) placeMarks(column, marks);
+}
+
+function placeMarks(column, marks) {
+  const view = column.querySelector("i"), { offsetWidth: width, offsetHeight: height } = view;
+  const isRight = column.parentElement.matches(".right"), rows = []; // where the labels of each row above a strip end
+  marks.sort((a, b) => isRight ? a.x - b.x : a.y - b.y);
+  let low = 0;
+  for (const [n, mark] of marks.entries()) {
+    if (isRight) {
+      mark.left = Math.min(Math.max(0, mark.x * width - MARGIN / 2), width - MARGIN);
+      const free = rows.findIndex(end => end <= mark.left), row = free < 0 ? rows.length : free;
+      rows[row] = mark.left + MARGIN;
+      mark.top = -LABEL * (row + 1) - 4;
+      mark.from = [mark.left + MARGIN / 2, mark.top + LABEL];
+    } else {
+      mark.top = Math.max(low, Math.min(mark.y * height - LABEL / 2, height - LABEL * (marks.length - n))); // leaves room for others
+      low = mark.top + LABEL;
+      mark.left = width + 8;
+      mark.from = [mark.left, mark.top + LABEL / 2];
+    }
+  }
+  if (isRight) view.style.marginTop = `${rows.length * LABEL + 4}px`;
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg"), { offsetLeft, offsetTop } = view;
+  svg.setAttribute("class", "feet");
+  for (const { button, kinds, x, y, left, top, from } of marks) {
+    Object.assign(button.style, { left: `${offsetLeft + left}px`, top: `${offsetTop + top}px` });
+    const line = svg.appendChild(document.createElementNS(svg.namespaceURI, "path"));
+    line.setAttribute("d", `M${offsetLeft + from[0]} ${offsetTop + from[1]} L${offsetLeft + x * width} ${offsetTop + y * height}`);
+    line.setAttribute("class", kinds);
+    column.append(button);
+  }
+  column.append(svg);
 }
 
 function drawDetails() {
@@ -214,21 +278,14 @@ function drawDetails() {
   const words = { missed: "missed", false: "false: no vehicle", class: "wrong class", direction: "wrong direction" };
   const errors = Object.keys(mark.fixes).map(error => words[error]).join(", ") || "right";
   const title = `${mark.line}, ${clock(mark.seconds)}${mark.id === undefined ? "" : `, id ${mark.id}`}: ${errors}`;
-  const button = (text, action, isOn) => {
-    const node = element("button", "", text);
-    node.setAttribute("aria-pressed", isOn);
-    node.onclick = action;
-    return node;
-  };
+  const button = (text, onclick, ariaPressed) => Object.assign(element("button", "", text), { onclick, ariaPressed });
   box.replaceChildren(element("h3", "", title),
     button(isMissed(mark) ? "X Remove" : "X False", toggleFalse, "false" in mark.fixes),
     button(`D ${directionOf(mark)}`, turn, "direction" in mark.fixes),
     ...data.classes.map((item, i) => button(`${i < 9 ? i + 1 : ""} ${item}`, () => setClass(item), item === classOf(mark))));
-  if (!get(`crop-${mark.id}`)) return;
-  const image = element("img");
-  image.src = addressOf(`crop-${mark.id}`);
-  image.alt = `Best picture of ${mark.id}`;
-  box.prepend(image);
+  const shown = [["crop", `crop-${mark.id}`, `Best picture of ${mark.id}`], ["moment", mark.moment, "The frame when it crosses"]];
+  for (const [kind, name, alt] of shown.filter(([, id]) => id && get(id)))
+    box.prepend(Object.assign(element("img", kind), { alt, src: addressOf(name) }));
 }
 
 const ERRORS = ["missed", "false", "class", "direction"];
@@ -249,14 +306,9 @@ function totals() {
 }
 
 function drawSummary() {
-  const table = element("table", "named"), head = element("tr");
-  for (const text of ["line", "class", "counted", "checked", "missed", "false", "wrong class", "wrong direction"]) head.append(element("th", "", text));
-  table.append(head);
-  for (const values of totals()) {
-    const row = element("tr");
-    for (const value of values) row.append(element("td", "", value));
-    table.append(row);
-  }
+  const row = (tag, values) => element("tr", "", ...values.map(value => element(tag, "", value)));
+  const headings = ["line", "class", "counted", "checked", "missed", "false", "class", "direction"];
+  const table = element("table", "named", row("th", headings), ...totals().map(values => row("td", values)));
   get("summary").replaceChildren(element("p", "", sentence()), table);
 }
 
@@ -307,8 +359,12 @@ function refresh(isNew = false) {
   drawDetails();
   drawSummary();
   drawEstimate();
+  withStorage(storage => storage.setItem(data.key, JSON.stringify({ state, current })));
+}
+
+function withStorage(use) {
   try {
-    localStorage.setItem(data.key, JSON.stringify({ state, current }));
+    use(localStorage);
   } catch {
     get("hint").textContent = "This browser keeps nothing; save before you close the page.";
   }
@@ -387,15 +443,14 @@ async function open(file) {
 }
 
 function save() {
-  const link = element("a"), file = new Blob([corrections()], { type: "text/yaml" });
+  const file = new Blob([corrections()], { type: "text/yaml" });
   if (file.size > data.limit) {
     get("hint").textContent = `Not saved: the file would have more than ${data.limit} bytes. Review a part: vdet review --start --end.`;
     return;
   }
-  link.href = URL.createObjectURL(file);
-  link.download = "corrections.yaml";
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  const href = URL.createObjectURL(file);
+  Object.assign(element("a"), { href, download: "corrections.yaml" }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 10000);
   get("hint").textContent = "corrections.yaml was saved; pass it to vdet count --corrections.";
 }
 
@@ -420,26 +475,18 @@ document.addEventListener("keydown", event => {
   else return;
   event.preventDefault();
 });
-get("next").onclick = actions.Enter;
-get("back").onclick = actions.ArrowLeft;
-get("undo").onclick = undo;
-get("save").onclick = save;
-get("draw").onclick = draw;
-get("open").onclick = () => get("file").click();
+const buttons = { next: actions.Enter, back: actions.ArrowLeft, undo, save, draw, open: () => get("file").click() };
+for (const [id, action] of Object.entries(buttons)) get(id).onclick = action;
 get("file").onchange = event => {
   const [file] = event.target.files;
   event.target.value = "";
   if (file) open(file);
 };
-get("size").oninput = () => refresh(true);
+addEventListener("resize", () => refresh(true));
 get("reviewer").onchange = event => change(() => { state.reviewer = event.target.value.trim(); });
 
-try {
-  const stored = JSON.parse(localStorage.getItem(data.key));
-  if (stored) ({ state, current } = stored);
-} catch {
-  get("hint").textContent = "This browser keeps nothing; save before you close the page.";
-}
+withStorage(storage => ({ state, current } = JSON.parse(storage.getItem(data.key)) ?? { state, current }));
 get("reviewer").value = state.reviewer;
+get("scene").src = addressOf("scene-picture");
 refresh(true);
 document.body.dataset.ready = "yes";
