@@ -9,7 +9,6 @@ from typing import Any
 from urllib.parse import quote
 
 import cv2
-import numpy as np
 from markupsafe import Markup, escape
 
 from vdet.boxes import Image
@@ -60,12 +59,11 @@ def jpeg_uri(image: Image, max_side: int | None = None) -> str:
 def thumbnail(image: Image) -> bytes:
     """Return a BGR uint8 image as WebP of at most 96 pixels and 2 KB."""
     small = shrunk(image, _SMALL_SIDE / max(image.shape[:2]))
-    data = np.empty(0, np.uint8)
     for quality in (70, 50, 30, 10):
-        _, data = cv2.imencode(".webp", small, [cv2.IMWRITE_WEBP_QUALITY, quality])
-        if data.size <= _SMALL_BYTES:
+        data = cv2.imencode(".webp", small, [cv2.IMWRITE_WEBP_QUALITY, quality])[1].tobytes()
+        if len(data) <= _SMALL_BYTES:
             break
-    return data.tobytes()
+    return data
 
 
 def webp_uri(data: bytes) -> str:

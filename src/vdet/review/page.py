@@ -184,9 +184,7 @@ class Review:
             "zones": [zone.name for zone in self.traffic.zones],
             "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],
             "pictures": [asdict(picture) for picture in self.pictures],
-            "marks": [
-                {**_values(mark), "id": mark.event.id, "moment": mark.moment} for mark in self.marks
-            ],
+            "marks": [{**_values(mark), "id": mark.event.id} for mark in self.marks],
             "traces": [asdict(trace) for trace in self.traces],
             "classes": [*STANDARD_CLASSES, *sorted(unlisted)],
             "spans": [{"number": n, "start": a, "end": b} for n, (a, b) in spans.items()],
@@ -238,7 +236,7 @@ def _values(mark: EventMark) -> dict[str, Any]:
     event = mark.event
     place = {"band": mark.band, "seconds": round(event.time, 3), "position": mark.position}
     names = {"line": event.name, "direction": event.direction, "class": class_of(event)}
-    return place | names | {"vehicle": event.vehicle}
+    return place | names | {"vehicle": event.vehicle, "moment": mark.moment}
 
 
 def write_review(file: TextIO, review: Review, folder: Path, index: str) -> None:
@@ -308,7 +306,6 @@ class ReviewRecorder:
         self._folder = tempfile.TemporaryDirectory()
         self._pictures: list[StripPicture] = []
         self._minute = 0
-        self._has_scene = False
         self._coding: Coding | None = None
 
     def __enter__(self) -> Self:
@@ -319,8 +316,9 @@ class ReviewRecorder:
 
     def add(self, frame: FrameTracks, selected: FrameTracks, picture: Picture) -> None:
         """Add a frame, with its tracks, and those of the selected classes."""
-        if not self._has_scene:
-            self._write_scene(picture.image)
+        if not (self._tracks or self._pictures):  # the first frame
+            small = self._reduced(picture.image, _SCENE_WIDTH, largest=0)
+            self._write("scene-picture", scene_picture(small, self._settings.traffic, ()))
         if (minute := int(frame.time // _MINUTE)) != self._minute:
             self._end_minute(is_end=False)
             self._minute = minute
@@ -328,12 +326,10 @@ class ReviewRecorder:
         self._tracks.append(frame)
         passed = list(map(len, self._passages.by_band))
         self._passages.add(frame)
-        for number, (strip, passages) in enumerate(
-            zip(self._strips, self._passages.by_band, strict=True)
-        ):
-            strip.add(frame.time, picture, passages)
+        for number, passages in enumerate(self._passages.by_band):
+            self._strips[number].add(frame.time, picture, passages)
             for passage in passages[passed[number] :]:
-                self._write_moment(number, passage, frame, picture.image)
+                self._write_moment(number, passage, picture.image)
         self._write_crops(self._crops.add(selected, picture))
 
     def end(self) -> tuple[Trace, ...]:
@@ -436,16 +432,9 @@ class ReviewRecorder:
         for crop in crops:
             (Path(self._folder.name) / crop_name(crop.id)).write_bytes(thumbnail(crop.image))
 
-    def _write_scene(self, image: Image) -> None:
-        self._has_scene = True
-        small = self._reduced(image, _SCENE_WIDTH, largest=0)
-        self._write("scene-picture", scene_picture(small, self._settings.traffic, ()))
-
-    def _write_moment(
-        self, number: int, passage: BandPassage, frame: FrameTracks, image: Image
-    ) -> None:
+    def _write_moment(self, number: int, passage: BandPassage, image: Image) -> None:
         """Write a frame in which a vehicle passes a line, with its box, the line and its path."""
-        sides = (side for t in frame.tracks for side in (t.box.width, t.box.height))
+        sides = (side for t in self._tracks[-1].tracks for side in (t.box.width, t.box.height))
         small = self._reduced(image, _MOMENT_WIDTH, largest=max(sides)).copy()
         tracks = [t for item in self._tracks for t in item.tracks if t.id == passage.id]
         band, box = self._strips[number].band, tracks[-1].box

@@ -95,14 +95,8 @@ class Survey:
         checks = self.checks()
         top = [self.facts(), *([checks] if checks.rows else []), self.volumes()]
         summary = Sheet("Summary", top, picture)
-        return [
-            summary,
-            *(
-                Sheet(name, [table], printed=name != "Vehicles")
-                for name, table in single.items()
-                if table.rows
-            ),
-        ]
+        others = (Sheet(n, [t], printed=n != "Vehicles") for n, t in single.items() if t.rows)
+        return [summary, *others]
 
     def facts(self) -> SheetTable:
         """Return what the survey is, when and how it was made, and whether it is in doubt."""
