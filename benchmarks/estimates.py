@@ -89,7 +89,7 @@ class Result:
 
 
 def simulate(situation: Situation, seed: int) -> dict[VehicleGroup, Result]:
-    """Return the results of one sample, by group."""
+    """Return the results of one sample, by group; arrays are (minutes, lines, classes)."""
     rng = np.random.default_rng(seed)
     minutes, names = situation.minutes, list(CLASSES)
     rates = np.repeat(situation.rates, minutes // len(situation.rates))
@@ -98,39 +98,25 @@ def simulate(situation: Situation, seed: int) -> dict[VehicleGroup, Result]:
     hidden, wrong = (rng.gamma(shape, 1 / shape, minutes) for _ in range(2))
     missing = np.minimum(0.9, situation.missed * harder * hidden)
     missing = np.where(rng.random(minutes) < situation.bursts, 0.5, missing)
-    groups = [ALL, *(VehicleGroup(str(line), "in") for line in range(len(situation.lines)))]
-    groups += [VehicleGroup(class_name=name) for name in names]
-    numbers = {group: np.zeros((3, minutes), np.int64) for group in groups}
-    true = dict.fromkeys(groups, 0)
-
-    def add(minute: int, line: int, counted: int | None, right: int | None) -> None:
-        """Add a vehicle of a class, by its number; None: it was not counted, or did not pass."""
-        before, after = (
-            () if kind is None
-            else (ALL, VehicleGroup(str(line), "in"), VehicleGroup(class_name=names[kind]))
-            for kind in (counted, right)
-        )  # fmt: skip
-        for group in {*before, *after}:
-            was, is_now = group in before, group in after
-            numbers[group][:, minute] += was, is_now > was, was > is_now
-            true[group] += is_now
-
-    shares = list(CLASSES.values())
-    for minute in range(minutes):
-        for line, (part, worse) in enumerate(situation.lines):  # the same minutes are hard at all
-            traffic = part * rates[minute]
-            false = traffic * situation.false * wrong[minute] + situation.ghosts
-            for kind in rng.choice(3, rng.poisson(false), p=shares):
-                add(minute, line, kind, None)
-            for kind in rng.choice(3, rng.poisson(traffic), p=shares):
-                if rng.random() < worse * missing[minute]:
-                    add(minute, line, None, kind)
-                    continue
-                is_renamed = rng.random() < situation.renamed.get(names[kind], 0)
-                add(minute, line, (kind + 1) % 3 if is_renamed else kind, kind)
+    parts, worse = np.array(situation.lines).T[..., np.newaxis]
+    shares, of_minute = np.array(list(CLASSES.values())), (slice(None), np.newaxis, np.newaxis)
+    traffic = rates[of_minute] * parts * shares
+    passed = rng.poisson(traffic)
+    # The same minutes are hard at all lines.
+    missed = rng.binomial(passed, np.minimum(1.0, worse * missing[of_minute]))
+    renamed = rng.binomial(passed - missed, [situation.renamed.get(name, 0.0) for name in names])
+    false = rng.poisson(traffic * situation.false * wrong[of_minute] + situation.ghosts * shares)
+    renamed_to = np.roll(renamed, 1, axis=2)
+    counted = passed - missed - renamed + renamed_to + false
+    in_class = np.stack([counted, missed + renamed, false + renamed_to])
+    in_line = np.stack([counted, missed, false]).sum(axis=3)
+    numbers = {ALL: in_line.sum(axis=2)}
+    numbers |= {VehicleGroup(str(n), "in"): in_line[..., n] for n in range(len(parts))}
+    numbers |= {VehicleGroup(class_name=n): in_class[..., k].sum(2) for k, n in enumerate(names)}
+    true = {group: of_group[0] + of_group[1] - of_group[2] for group, of_group in numbers.items()}
     order = draw_spans(numbers[ALL][0], seed)
     estimates = estimate(numbers, order[: situation.checked], order)
-    return {item.group: Result(item, true[item.group]) for item in estimates}
+    return {item.group: Result(item, int(true[item.group].sum())) for item in estimates}
 
 
 def measure(situation: Situation, samples: int) -> dict[str, list[Result]]:

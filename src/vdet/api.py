@@ -42,7 +42,7 @@ from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
-from vdet.review.correcting import all_classes, apply_corrections
+from vdet.review.correcting import apply_corrections
 from vdet.review.corrections import Corrections
 from vdet.run.images import ImageJob, ImageSearch, run_images
 from vdet.run.inputs import input_files
@@ -315,10 +315,10 @@ def count(
         A file of corrections that a reviewer saved, or several, which are merged.
     """
     reviews = [Corrections.read(Path(path)) for path in _listed(corrections)]
-    key, counting = "", all_classes(settings, reviews)
+    key, with_all = "", bool(reviews)
     if isinstance(tracks, str | PathLike):
         key = str(Path(tracks))
-        counted = count_files([Path(tracks)], counting, size, rate)
+        counted = count_files([Path(tracks)], settings, size, rate, with_all_classes=with_all)
     else:
         frames = iter(tracks)
         first = next(frames, None)
@@ -326,7 +326,7 @@ def count(
             size = size or (first.frame.picture.width, first.frame.picture.height)
         items = frames if first is None else chain([first], frames)
         shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in items)
-        counts = count_frames(shown, counting, size)
+        counts = count_frames(shown, settings, size, with_all_classes=with_all)
         if isinstance(first, FrameResult) and size:
             source = SourceVideo(valid_text(first.source.as_posix()), *size)
             counts = replace(counts, source=source)

@@ -49,7 +49,7 @@ def test_corrections_are_truth_for_any_counts_of_the_video(run: Run, folder: Pat
     result = run("eval", "counts", plain, review, code=0)
     assert result.out.splitlines()[-1].split()[3:] == ["1", "1", "0", "0", "1", "100.0", "0.0"]
     result = run(*count, "--corrections", review, "--class", "bus", code=0)
-    assert result.out.splitlines()[1].split()[1:] == ["gate", "out", "1", "1", "bus"]
+    assert result.out.splitlines()[1].split()[1:8] == ["gate", "out", *"011", "(1", "to", "1)"]
     for table, fault in (
         ("time,name,direction,class,id\nsoon,gate,in,,1\n", ":2: time: must be a valid number"),
         ("video,time,name,direction,class,id\na,1,gate,in,car,1\n", ": has several videos"),
@@ -94,7 +94,17 @@ def test_several_videos_have_corrections_of_their_own(run: Run, folder: Path) ->
         f"{paths[1]}: corrected: 1 event, by b.yaml; minutes checked: 0.03 of 0.03; at checked "
         "lines 1 counted, 2 corrected, 2 estimated (95 %: 2 to 2)\n"
     )
-    videos = json.loads(totals.read_text())["videos"]
+    content = json.loads(totals.read_text())
+    rows = {(row["direction"], row["class"]): row for row in content["totals"]}
+    numbers = {way: [row[k] for k in ("counted", "count", "checked")] for way, row in rows.items()}
+    assert numbers["in", "truck"] == [0, 1, 1.96]
+    assert numbers["out", "vehicle"] == [2, 2, 1.96]
+    none = dict.fromkeys(("estimated", "low", "high"))  # of the video that nobody checked
+    assert content["volumes"][:2] == [
+        {"name": "gate", "direction": "out", "counted": 2, "corrected": 2, **none},
+        {"name": "gate", "direction": "in", "counted": 0, "corrected": 1, **none},
+    ]
+    videos = content["videos"]
     assert [video.get("corrected") for video in videos.values()] == [
         None,
         {

@@ -92,6 +92,10 @@ def test_people_in_tracks_of_another_tool_are_counted_only_if_chosen(
         result = run("count", tracks, *lines, *chosen, "--counts", counts, code=0)
         assert len([row for row in rows_of(counts) if row["name"] == "gate"]) == count
         assert ("people are not counted; to count them, use --class" in result.err) == (not count)
+    review = tmp_path / "fixes.yaml"
+    review.write_text("video: t.mp4\nsize: [320, 240]\n")
+    result = run("count", tracks, *lines, "--class", "person", "--corrections", review, code=0)
+    assert result.out.splitlines()[1].split()[1:] == ["gate", "out", "1", "1", "-", "1", "person"]
 
 
 @pytest.mark.parametrize("form", ["jsonl", "coco.json"])

@@ -197,13 +197,19 @@ def test_files_for_some_of_the_lines_give_one_result_in_either_order(tmp_path: P
         corrected(run, a, c)
 
 
-def test_a_part_says_nothing_of_what_lies_before_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("part", [(40.0, 100.0), (0.0, 60.0)])
+def test_a_part_says_nothing_of_what_lies_outside_it(
+    tmp_path: Path, part: tuple[float, float]
+) -> None:
     run = replace(counts(), spans=((0.0, 100.0),))
-    checked = spans("line", "second", start=40.0, end=100.0)
-    path = saved(tmp_path / "c.yaml", checked=checked, start=40.0, end=100.0, span=20.0)
-    after = corrected(run, path).corrected
-    assert after
-    assert (after.checked, after.estimates) == (((40.0, 100.0),), ())
+    start, end = part
+    checked = spans("line", "second", start=start, end=end)
+    path = saved(tmp_path / "c.yaml", checked=checked, start=start, end=end, span=20.0)
+    after = corrected(run, path)
+    assert after.corrected
+    assert (after.corrected.checked, after.corrected.estimates) == ((part,), ())
+    [note] = after.findings
+    assert (note.severity, note.text[:11]) == ("note", "no estimate")
 
 
 def test_only_the_chosen_classes_are_estimated(tmp_path: Path) -> None:

@@ -69,7 +69,8 @@ def test_the_counts_so_far_have_those_inside_a_zone() -> None:
 
 
 def test_the_counts_so_far_may_be_of_fewer_classes() -> None:
-    counter = VehicleCounter(SETTINGS, WIDTH, HEIGHT, running=["truck"])
+    trucks = SETTINGS.model_copy(update={"classes": ("truck",)})
+    counter = VehicleCounter(trucks, WIDTH, HEIGHT, with_all_classes=True)
     for frame in frames(DOWN, through((2, 300, 350), (4, 500, 350))):
         counter.update(frame)
         assert not counter.so_far()

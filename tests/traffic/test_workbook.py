@@ -201,7 +201,7 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
         south out       1 1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
         box   enter     0 1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
         box   exit      0 1 0.9 1 0 0 0   1   07:00:00 1 0.25 - -
-        all_flows -     - 4 3.4 2 1 1 25  5.5 07:00:00 3 0.75 41.5 41.5"""
+        all_flows -     3 4 3.4 2 1 1 25  5.5 07:00:00 3 0.75 41.5 41.5"""
     assert lines_of(book)["Summary"] == table(facts)
 
 

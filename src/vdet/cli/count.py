@@ -15,7 +15,7 @@ from vdet.files import OutputFiles, output_errors, write_text
 if TYPE_CHECKING:
     from vdet.boxes import Image
     from vdet.run.sinks import Output
-    from vdet.traffic.counts import Counts
+    from vdet.traffic.counts import Counts, Estimate
     from vdet.traffic.survey import Survey
 
 
@@ -80,7 +80,7 @@ def count(
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
     from vdet.pages.traffic import survey_image
-    from vdet.review.correcting import all_classes, apply_corrections
+    from vdet.review.correcting import apply_corrections
     from vdet.review.corrections import Corrections
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.counting import count_files
@@ -92,8 +92,9 @@ def count(
     reviews, scene = list(map(Corrections.read, corrections)), survey_image(settings)
     with progress_bars(" files") as progress:
         advance = progress("", len(tracks) if len(tracks) > 1 else None)
-        counting = all_classes(settings, reviews)
-        videos = count_files(tracks, counting, size, rate, advance=advance)
+        videos = count_files(
+            tracks, settings, size, rate, with_all_classes=bool(reviews), advance=advance
+        )
     videos = apply_corrections(videos, reviews, settings)
     for name, result in videos.items():
         if result.clock:
@@ -149,12 +150,24 @@ def _totals(videos: "Mapping[str, Counts]") -> list[str]:
         totals = {name: counts.totals for name, counts in videos.items()}
     if len(videos) > 1:
         totals["all files"] = direction_totals(list(videos.values()))
+    is_corrected = any(counts.corrected for counts in videos.values())
     rows = []
     for file, directions in totals.items():
         for total in directions:
+            numbers = [str(total.count)]
+            if is_corrected:
+                numbers = [str(total.counted), str(total.count), _estimated(total.estimate)]
             classes = ", ".join(quantity(number, kind) for kind, number in total.classes.items())
-            rows.append((file, total.name, total.direction, str(total.count), classes))
-    return table(("file", "name", "direction", "count", "classes"), rows)
+            rows.append((file, total.name, total.direction, *numbers, classes))
+    headings = ("counted", "corrected", "estimated (95 %)") if is_corrected else ("count",)
+    return table(("file", "name", "direction", *headings, "classes"), rows)
+
+
+def _estimated(estimate: "Estimate | None") -> str:
+    """Return an estimate with its interval."""
+    if estimate is None:
+        return "-"
+    return f"{estimate.true:.0f} ({estimate.low:.0f} to {estimate.high:.0f})"
 
 
 def _matrix(videos: "Sequence[Counts]") -> list[str]:

@@ -34,6 +34,7 @@ from vdet.traffic.counts import (
 from vdet.traffic.crossings import APPEAR, ENTER
 
 _IMBALANCE = "{}: after corrections, more vehicles enter than leave, or fewer; occupancy is unknown"
+_BEYOND = "no estimate: more of the video was counted than was reviewed; review all of it"
 NO_FRAME = -1
 """`Event.frame` of a vehicle that a reviewer added."""
 
@@ -51,11 +52,6 @@ class Judged:
     right: Event | None
     is_certain: bool = False
     fault: str | None = None
-
-
-def all_classes(settings: Settings, reviews: Sequence[Corrections]) -> Settings:
-    """Return the settings with which to count before corrections, which may be of any class."""
-    return settings.model_copy(update={"classes": ()}) if reviews else settings
 
 
 def correct(
@@ -78,7 +74,9 @@ def correct(
         if review := corrections.get(key):
             corrected = _corrected(counts, review, chosen)
             problems = (*corrected.faults, *map(_IMBALANCE.format, unbalanced_zones(result[key])))
-            found = tuple(Finding("corrections", problem) for problem in problems)
+            found = [Finding("corrections", problem) for problem in problems]
+            if corrected.checked and not _is_within(counts, review):
+                found.append(Finding("corrections", _BEYOND, severity="note"))
             findings = (*counts.findings, *found)
             result[key] = replace(result[key], corrected=corrected, findings=findings)
     return result
@@ -236,14 +234,20 @@ def covers(checked: Sequence[Span], span: Span) -> bool:
     return any(a < start + TOLERANCE and end < b + TOLERANCE for a, b in checked)
 
 
+def _is_within(counts: Counts, review: Corrections) -> bool:
+    """Return whether all that was counted is of the part that was reviewed."""
+    (first, _), (_, last) = counts.spans[0], counts.spans[-1]
+    end = inf if review.end is None else review.end
+    return review.start - TOLERANCE <= first and last <= end + TOLERANCE
+
+
 def _estimates(
     counts: Counts, review: Corrections, items: Sequence[Judged], checked: Sequence[Span]
 ) -> list[Estimate]:
     """Return the true number of events at the checked lines, as the page of the review does."""
-    (first, _), (_, last) = counts.spans[0], counts.spans[-1]
-    end = last if review.end is None else review.end
-    if not checked or first < review.start - TOLERANCE or last > end + TOLERANCE:
-        return []  # nothing is known of what lies outside the part that was reviewed
+    if not checked or not _is_within(counts, review):
+        return []
+    end = counts.spans[-1][1] if review.end is None else review.end
     spans = equal_spans(review.start, end, review.span, counts.spans)
     starts, names = [start for start, _ in spans.values()], {span.line for span in review.checked}
     ways = [(n, way) for n, way in counts.directions if n in names and review.shows(n, way)]

@@ -52,8 +52,8 @@ class VehicleCounter:
     ----------
     started
         Number of vehicles counted before.
-    running
-        The classes of the running counts, if those of `settings` are more; empty for the same.
+    with_all_classes
+        Count all, because corrections may be of any class; running counts keep to the settings.
 
     Attributes
     ----------
@@ -76,10 +76,12 @@ class VehicleCounter:
         width: int,
         height: int,
         started: int = 0,
-        running: Collection[str] = (),
+        *,
+        with_all_classes: bool = False,
     ) -> None:
         self._settings = settings
-        self._running = running
+        self._running = settings.classes
+        self._classes: Collection[str] = () if with_all_classes else settings.classes
         self.lines, self.zones = lines_and_zones(settings.traffic, width, height)
         self.spans: list[Span] = []
         self.borders: tuple[Border, ...] = (*self.lines, *self.zones)
@@ -157,7 +159,7 @@ class VehicleCounter:
 
     def _passages(self, paths: Iterable[VehiclePath]) -> list[_PathEvents]:
         """Return the passages that count: of the classes, seen long enough, and not parked."""
-        minimum, classes = self._settings.traffic.min_seen_seconds, self._settings.classes
+        minimum, classes = self._settings.traffic.min_seen_seconds, self._classes
         seen = (path for path in paths if path.seconds >= minimum and path.has_moved)
         return [self._passage(path) for path in seen if is_chosen(path.class_name, classes)]
 

@@ -48,6 +48,7 @@ def count_files(
     size: tuple[int, int] | None = None,
     rate: float | None = None,
     *,
+    with_all_classes: bool = False,
     advance: Advance = lambda _: None,
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks of one camera at the lines and zones of the settings.
@@ -64,6 +65,8 @@ def count_files(
         Width and height of the frames, pixels; None: from the file, else from `camera.size`.
     rate
         Frames per second, for a file without times.
+    with_all_classes
+        As for `VehicleCounter`.
     advance
         Called after each file with 1.
 
@@ -81,7 +84,7 @@ def count_files(
         the pattern of the clock, or no file needs the `rate`.
     """
     rate_is_used = rate is None
-    recording = _Recording(settings)
+    recording = _Recording(settings, with_all_classes=with_all_classes)
     distinct = list(dict.fromkeys(paths))
     order = recording.in_order(distinct) if len(distinct) > 1 else [(distinct[0], None)]
     for path, clock_of_head in order:
@@ -117,11 +120,15 @@ def _without_people(path: Path, saved: SavedTracks, settings: Settings) -> Saved
 
 
 def count_frames(
-    frames: Iterable[FrameTracks], settings: Settings, size: tuple[int, int] | None = None
+    frames: Iterable[FrameTracks],
+    settings: Settings,
+    size: tuple[int, int] | None = None,
+    *,
+    with_all_classes: bool = False,
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`."""
     frame_size = _frame_size(settings, size)
-    group = _Group(settings, frame_size)
+    group = _Group(settings, frame_size, with_all_classes=with_all_classes)
     group.add(_CountedVideo("", frame_size), frames)
     return group.counts()[""]
 
@@ -201,8 +208,8 @@ class _CountedVideo:
 class _Recording:
     """The videos of one camera."""
 
-    def __init__(self, settings: Settings) -> None:
-        self._settings = settings
+    def __init__(self, settings: Settings, *, with_all_classes: bool) -> None:
+        self._settings, self._with_all_classes = settings, with_all_classes
         self._counts: dict[str, Counts] = {}
         self._group: _Group | None = None
         self._latest: tuple[_CountedVideo, SavedTracks] | None = (
@@ -259,7 +266,9 @@ class _Recording:
         if not (group and before and video.clock and group.size == size):
             self._end_group()
             started = group.counter.linker.started if group else 0
-            self._group = group = _Group(self._settings, size, started)
+            self._group = group = _Group(
+                self._settings, size, started, with_all_classes=self._with_all_classes
+            )
         group.add(video, saved)
         if video.clock and (video.spans or not before):
             self._latest = video, saved
@@ -286,11 +295,18 @@ def _clock_after(before: _CountedVideo, video: _CountedVideo) -> Clock:
 class _Group:
     """Videos that follow one another, with frames of one size and one counter."""
 
-    def __init__(self, settings: Settings, size: tuple[int, int], started: int = 0) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        size: tuple[int, int],
+        started: int = 0,
+        *,
+        with_all_classes: bool,
+    ) -> None:
         self.size, self._ignored = size, settings.conditions.ignore
         self._ground = ground_of(settings.camera, *size)
         self._regions = Regions(settings.regions, *size) if settings.regions else None
-        self.counter = VehicleCounter(settings, *size, started)
+        self.counter = VehicleCounter(settings, *size, started, with_all_classes=with_all_classes)
         self._videos: list[_CountedVideo] = []
 
     def add(self, video: _CountedVideo, frames: Iterable[FrameTracks]) -> None:

@@ -4,10 +4,11 @@ Tables cover the whole video or intervals of it. Several videos have one table.
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime
 from itertools import accumulate, chain, pairwise, product
+from math import hypot
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from vdet.config.classes import UNKNOWN
@@ -104,12 +105,22 @@ class GroupedEvent:
 
 @dataclass(frozen=True, slots=True)
 class DirectionTotal:
-    """Number of vehicles counted in a direction, in total and by class."""
+    """Number of vehicles in a direction, in total and by class.
+
+    Attributes
+    ----------
+    counted
+        Number before corrections.
+    estimate
+        Estimate of the true number; None if one of the videos has none.
+    """
 
     name: str
     direction: str
     count: int
     classes: dict[str, int]
+    counted: int
+    estimate: "Estimate | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,6 +393,11 @@ class Counts:
         return tuple(name for name in names if name not in self.outside_flows)
 
     @property
+    def uncorrected(self) -> "Counts":
+        """The counts before corrections."""
+        return replace(self, events=self.corrected.counted) if self.corrected else self
+
+    @property
     def totals(self) -> tuple[DirectionTotal, ...]:
         """The totals over the whole video, including directions without vehicles."""
         return direction_totals([self])
@@ -491,9 +507,14 @@ class Tally(Generic[Key]):
     intervals: Intervals
     numbers: Counter[tuple[int | None, Key | None, str | None]]
 
-    def rows(self, keys: Iterable[Key]) -> Iterator[tuple[Any, ...]]:
-        """Yield the values of each interval, key, and class that occurs, even if it is 0."""
-        classes = sorted({kind for _, _, kind in self.numbers if kind}) or [UNKNOWN]
+    @property
+    def classes(self) -> set[str]:
+        """The classes that occur."""
+        return {kind for _, _, kind in self.numbers if kind}
+
+    def rows(self, keys: Iterable[Key], more: Collection[str] = ()) -> Iterator[tuple[Any, ...]]:
+        """Yield the values of each interval, key, and class that occurs or is one of `more`."""
+        classes = sorted({*self.classes, *more}) or [UNKNOWN]
         for period, key, kind in product(self.intervals.periods, keys, classes):
             count = self.numbers[period.number, key, kind]
             flow = period.observed, period.is_part, per_hour(count, period.observed)
@@ -502,17 +523,44 @@ class Tally(Generic[Key]):
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
     """Return the totals of each direction over all videos."""
-    return tuple(
-        DirectionTotal(
-            name=name,
-            direction=direction,
-            count=len(group),
-            classes=dict(
-                sorted(Counter(kind for item in group if (kind := item.event.class_name)).items())
-            ),
-        )
-        for (name, direction), group in EventGroups(videos).directions.items()
+    counted = EventGroups([video.uncorrected for video in videos]).directions
+    estimates = defaultdict[Any, list[Estimate]](list)
+    for item in (e for v in videos if v.corrected for e in v.corrected.estimates):
+        estimates[item.group.name, item.group.direction].append(item)
+    totals = []
+    for way, group in EventGroups(videos).directions.items():
+        classes = Counter(kind for item in group if (kind := item.event.class_name))
+        estimate = _summed(estimates[way]) if len(estimates[way]) == len(videos) else None
+        by_class = dict(sorted(classes.items()))
+        totals.append(DirectionTotal(*way, len(group), by_class, len(counted[way]), estimate))
+    return tuple(totals)
+
+
+def _summed(estimates: Sequence[Estimate]) -> Estimate:
+    """Return the estimate for several videos, whose errors are independent."""
+    true = sum(item.true for item in estimates)
+    return replace(
+        estimates[0],
+        counted=sum(item.counted for item in estimates),
+        corrected=sum(item.corrected for item in estimates),
+        true=true,
+        low=true - hypot(*(item.true - item.low for item in estimates)),
+        high=true + hypot(*(item.high - item.true for item in estimates)),
     )
+
+
+def seconds_checked(
+    videos: Sequence[Counts], intervals: Intervals, period: Interval, name: str | None
+) -> float:
+    """Return how many seconds of an interval were checked at a line or zone."""
+    spans = (
+        (intervals.seconds(number, start), intervals.seconds(number, end))
+        for number, counts in enumerate(videos)
+        if counts.corrected and name in counts.corrected.names
+        for start, end in counts.corrected.checked
+    )
+    common = (min(end, period.last) - max(start, period.first) for start, end in spans)
+    return round(sum(seconds for seconds in common if seconds > 0), 3)
 
 
 def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[CountRow]:

@@ -76,12 +76,11 @@ class LiveTraffic:
         self._final: Counts | None = None
         self.counted: Counts | None = None
         self.vehicles: tuple[VehicleRecord, ...] = ()
-        if with_all_classes:  # until the counts are revised
-            settings = settings.model_copy(update={"classes": ()})
         self.counter = None
         if settings.traffic:
-            chosen = self._settings.classes
-            self.counter = VehicleCounter(settings, width, height, running=chosen)
+            self.counter = VehicleCounter(
+                settings, width, height, with_all_classes=with_all_classes
+            )
         ground = ground_of(settings.camera, width, height)
         self.speeds = SpeedMeter(ground, width, height) if ground else None
 

@@ -6,6 +6,7 @@ interval; events have the name of their video.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, fields
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,15 @@ from vdet.traffic.counts import (
     Corrected,
     CountRow,
     Counts,
+    DirectionTotal,
+    Estimate,
     Event,
     EventGroups,
     FlowRow,
     Key,
     Tally,
     ZoneRow,
+    seconds_checked,
 )
 from vdet.traffic.tables import VIDEO, is_json, plain_time
 
@@ -68,11 +72,14 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
     """
     every = list(videos.values())
     if is_json(path):
-        totals, zones = tables.count_table(every, interval), tables.zone_table(every, interval)
-        content = {"totals": _items(_TOTALS, totals), "zones": _items(_ZONES, zones)}
+        (columns, *totals), zones = _totals(every, interval), tables.zone_table(every, interval)
+        rows = [dict(zip(columns, row, strict=True)) for row in totals]
+        content = {"totals": rows, "zones": _items(_ZONES, zones)}
+        if any(video.corrected for video in every):
+            content["volumes"] = list(map(_volume, tables.direction_totals(every)))
         return _json(videos, interval, content, events=True)
     if _is_table(path, ".totals"):
-        return [_TOTALS, *map(_cells, tables.count_table(every, interval))]
+        return _totals(every, interval)
     if _is_table(path, ".wide"):
         groups = EventGroups(every)
         tally = groups.tally(groups.directions, interval)
@@ -83,6 +90,29 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
     if len(videos) == 1:
         return [_EVENTS, *(row for rows in events.values() for row in rows)]
     return [(VIDEO, *_EVENTS), *([name, *row] for name, rows in events.items() for row in rows)]
+
+
+def _totals(every: Sequence[Counts], interval: int | None) -> list[Sequence[Any]]:
+    """Return the heading and the rows of totals, after corrections also what was counted before.
+
+    `checked` is how many seconds of the interval were checked at the line or zone.
+    """
+    if not any(video.corrected for video in every):
+        return [_TOTALS, *map(_cells, tables.count_table(every, interval))]
+    groups, others = EventGroups(every), EventGroups([video.uncorrected for video in every])
+    tally = groups.tally(groups.directions, interval)
+    before = others.tally(others.directions, interval)
+    checked = [
+        seconds_checked(every, tally.intervals, period, name)
+        for period, (name, _) in product(tally.intervals.periods, groups.directions)
+        for _ in {*tally.classes, *before.classes} or [None]
+    ]
+    after = tally.rows(groups.directions, before.classes)
+    counted = (row[-4] for row in before.rows(groups.directions, tally.classes))
+    rows = [
+        [*_cells(CountRow(*row)), *more] for row, *more in zip(after, counted, checked, strict=True)
+    ]
+    return [(*_TOTALS, "counted", "checked"), *rows]
 
 
 def flows_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
@@ -160,11 +190,7 @@ def _corrected(corrected: Corrected) -> dict[str, Any]:
             "name": item.group.name,
             "direction": item.group.direction,
             "class": item.group.class_name,
-            "counted": item.counted,
-            "corrected": item.corrected,
-            "estimated": round(item.true, 1),
-            "low": round(item.low, 1),
-            "high": round(item.high, 1),
+            **_columns_of(item.counted, item.corrected, item),
             "more": item.minutes_to_precision,
         }
         for item in corrected.estimates
@@ -177,6 +203,19 @@ def _corrected(corrected: Corrected) -> dict[str, Any]:
         "corrections": corrections,
         "estimates": estimates,
     }
+
+
+def _volume(total: DirectionTotal) -> dict[str, Any]:
+    columns = _columns_of(total.counted, total.count, total.estimate)
+    return {"name": total.name, "direction": total.direction, **columns}
+
+
+def _columns_of(counted: int, corrected: int, estimate: Estimate | None) -> dict[str, Any]:
+    """Return a total as counted, corrected and estimated, with its interval; None: unknown."""
+    limits = (estimate.true, estimate.low, estimate.high) if estimate else (None,) * 3
+    names = zip(("estimated", "low", "high"), limits, strict=True)
+    values = {name: None if value is None else round(value, 1) for name, value in names}
+    return {"counted": counted, "corrected": corrected, **values}
 
 
 def _is_table(path: Path, kind: str) -> bool:

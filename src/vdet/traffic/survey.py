@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime, timedelta
 from itertools import chain, product
-from math import hypot
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from vdet.traffic.counts import (
     ZoneRow,
     class_of,
     names_in,
+    seconds_checked,
 )
 from vdet.traffic.workbook import Cell, Sheet, SheetTable
 from vdet.version import __version__
@@ -151,36 +151,29 @@ class Survey:
         whole, quarters = self.groups.tally(groups), None
         with suppress(ConfigError):  # there is no clock
             quarters = self.groups.tally(groups, measures.QUARTER)
+        before = self._before
         for key in keys:
             events = chain.from_iterable(groups.values()) if key is None else groups[key]
             names = names_in(key or ("all flows", ""))
             total, *cells = self._cells(whole, key)
-            totals = self._checked_total(key, total) if self._is_corrected else [total]
+            counted, estimate = before[key]
+            totals = [counted, total, *_limits(estimate)] if self._is_corrected else [total]
             yield [*names, *totals, *cells, *_peak_hour(quarters, key), *_speeds(events)]
+
+    @property
+    def _before(self) -> dict[tuple[str | None, ...] | None, tuple[int, Estimate | None]]:
+        """What was counted before corrections, and is estimated, by direction; None: all flows."""
+        flows = tables.EventGroups([counts.uncorrected for counts in self.counts]).flows
+        before: dict[tuple[str | None, ...] | None, tuple[int, Estimate | None]] = {
+            None: (sum(map(len, flows.values())), None)
+        }
+        for total in tables.direction_totals(self.counts):
+            before[total.name, total.direction] = total.counted, total.estimate
+        return before
 
     @property
     def _is_corrected(self) -> bool:
         return any(counts.corrected for counts in self.counts)
-
-    def _checked_total(self, key: tuple[str | None, ...] | None, corrected: Cell) -> list[Cell]:
-        """Return the cells below `_CHECKED` of a direction; None where they are not known."""
-        every = [counts.corrected for counts in self.counts]
-        if key is None:
-            return [None, corrected, *[None] * len(_ESTIMATED)]
-        estimates = [
-            item
-            for checked in every
-            for item in (checked.estimates if checked else ())
-            if (item.group.name, item.group.direction) == key
-        ]
-        before = sum(
-            (event.name, event.direction) == key
-            for counts in self.counts
-            for event in (counts.corrected.counted if counts.corrected else counts.events)
-        )
-        is_known = len(estimates) == len(every)
-        limits = map(round, _sums(estimates)) if is_known else [None] * len(_ESTIMATED)
-        return [before, corrected, *limits]
 
     def flows(self) -> SheetTable:
         """Return the number of vehicles in each flow, the largest flow first."""
@@ -195,22 +188,11 @@ class Survey:
         tally = self.groups.tally(groups, self.settings.traffic.seconds)
         rows = []
         for period, key in product(tally.intervals.periods, groups):
-            checked: list[Cell] = [self._seconds_checked(tally.intervals, period, key[0])]
+            checked: list[Cell] = [seconds_checked(self.counts, tally.intervals, period, key[0])]
             cells = self._cells(tally, key, period)
             rows.append([*_interval(period), *checked * self._is_corrected, *names_in(key), *cells])
         headings = [*_TIMES, *["checked, s"] * self._is_corrected]
         return SheetTable([*headings, *names, *self._headings], rows)
-
-    def _seconds_checked(self, intervals: Intervals, period: Interval, name: str | None) -> float:
-        """Return how much of an interval was checked at a line or zone."""
-        spans = (
-            (intervals.seconds(number, start), intervals.seconds(number, end))
-            for number, counts in enumerate(self.counts)
-            if counts.corrected and name in counts.corrected.names
-            for start, end in counts.corrected.checked
-        )
-        common = (min(end, period.last) - max(start, period.first) for start, end in spans)
-        return round(sum(seconds for seconds in common if seconds > 0), 3)
 
     @property
     def _headings(self) -> list[str]:
@@ -363,9 +345,13 @@ def _estimate(item: Estimate | None) -> list[Cell]:
     """Return the cells below `_ESTIMATE`."""
     if item is None:
         return [None] * len(_ESTIMATE)
-    group, limits = item.group, (item.true, item.low, item.high)
-    names = group.name or _ALL, group.direction, group.class_name
-    return [*names, item.counted, item.corrected, *map(round, limits)]
+    names = item.group.name or _ALL, item.group.direction, item.group.class_name
+    return [*names, item.counted, item.corrected, *_limits(item)]
+
+
+def _limits(item: Estimate | None) -> list[Cell]:
+    """Return the cells below `_ESTIMATED`."""
+    return list(map(round, (item.true, item.low, item.high))) if item else [None] * 3
 
 
 def _seam(before: Interval | None, file: Interval) -> str | None:
@@ -376,10 +362,3 @@ def _seam(before: Interval | None, file: Interval) -> str | None:
     if abs(gap) <= SEAM:
         return "continues"
     return f"gap of {gap:.0f} s" if gap > 0 else f"begins {-gap:.0f} s before its end"
-
-
-def _sums(estimates: Sequence[Estimate]) -> tuple[float, float, float]:
-    """Return the true number in several videos, and its interval: their errors are independent."""
-    true = sum(item.true for item in estimates)
-    below = hypot(*(item.true - item.low for item in estimates))
-    return true, true - below, true + hypot(*(item.high - item.true for item in estimates))

@@ -19,7 +19,7 @@ const PRECISION = 0.02; // half of the width of an interval that is precise enou
 
 // Part of the vehicles of a span that may be missed together in one that was not checked: it widens the upper limit, so that
 // it holds where errors come in bursts.
-const HIDDEN = 0.1;
+const HIDDEN = 0.15;
 
 /** Return a quantile of the gamma distribution; z is that of the normal distribution. */
 function gammaQuantile(mean, variance, z) {
@@ -57,9 +57,10 @@ function uncheckedErrors({ errors, size, strata, sample, unchecked, limit, unsee
 function errorBounds(errors, n, unchecked, spread) {
   const number = errors.number * unchecked, weight = errors.weight * spread;
   const single = errors.single * spread, scatter = errors.scatter * spread, hidden = errors.hidden * spread;
-  const added = ADDED * weight, high = gammaQuantile(number + added, single + added * (weight + 1) + hidden, Z);
+  const added = ADDED * weight, t = studentQuantile(n - 1);
+  const high = Math.max(gammaQuantile(number + added, single + added * (weight + 1) + hidden, Z),
+    number + t * Math.sqrt(hidden)); // of few spans the gamma distribution says too little
   if (number === 0) return [0, Math.min(high, errors.limit)];
-  const t = studentQuantile(n - 1);
   const low = Math.min(gammaQuantile(number, single, -Z), gammaQuantile(number, scatter, -t));
   return [Math.max(low, 0), Math.min(Math.max(high, gammaQuantile(number, scatter + hidden, t)), errors.limit)];
 }
