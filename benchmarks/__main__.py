@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.corrections import cost_of_thousands
 from benchmarks.material import find_video, read_pictures, shipped_svm
 from benchmarks.runs import (
     IMPORTS,
@@ -109,12 +110,15 @@ def measure_all(folder: Path, rounds: int) -> list[Measurement]:
         "played": (seconds_of_video(path), 0.0),
     }
     hour = seconds_of_count(folder, ".csv")
+    corrected, corrected_memory = cost_of_thousands(folder)
     whole, first = (peak_memory(path, folder, *extra) for extra in ((), ("--frames", "40")))
     parts = f"{whole:.0f} and {first:.0f} MB"
     name = "peak memory, whole video"
     return [
         *(_ratio(times, row) for row in ROWS),
         Measurement("vdet count, tracks of an hour", hour, "≤ 20", "8", "1.2 million boxes"),
+        Measurement("5,000 corrections over an hour", corrected, "≤ 1", "–", "seconds"),
+        Measurement("the same, memory at most", corrected_memory, "≤ 200", "–", "MB"),
         Measurement(name, whole, "≤ 260", "200", "MB"),
         Measurement(f"{name} / its first 40 frames", whole / first, "≤ 1.15", "–", parts),
     ]

@@ -7,10 +7,14 @@ class. The corrections are then applied to five kinds of other runs, of which ea
 many vehicles are wrong.
 """
 
+import json
+import time
+import tracemalloc
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import count
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +29,7 @@ from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import Counts, Event
 
 CLASSES = ("car", "truck", "bus", "motorcycle")
+LINE = {"name": "gate", "start": [0, 100], "end": [WIDTH, 100], "left": "in", "right": "out"}
 MISSING, DOUBLED, RENAMED = 0.05, 0.03, 0.10
 _SHIFT = 4
 """Distance of the second track of a vehicle, pixels."""
@@ -128,6 +133,44 @@ def differences(truth: Counts, counts: Counts) -> int:
     """Return how many vehicles are too few and too many, by line, direction and class."""
     true, counted = by_class(truth), by_class(counts)
     return ((true - counted) + (counted - true)).total()
+
+
+def cost_of_thousands(folder: Path, number: int = 5000) -> tuple[float, float]:
+    """Return the seconds, and the MB at most, that corrections spread over an hour take.
+
+    Every second event has the wrong class, and every third was missed; all are listed.
+    """
+    line = LINE | {"start": [0, 100 / HEIGHT], "end": [1, 100 / HEIGHT]}
+    settings = Settings.model_validate({"traffic": {"lines": [line]}})
+    times = [round(3600 * n / number, 3) for n in range(number)]
+    events = [
+        {"line": "gate", "time": moment, "direction": "in", "class": "car"}
+        | ({"error": "missed"} if n % 3 == 0 else {"id": n})
+        | ({"error": "class", "correct": "bus"} if n % 2 and n % 3 else {})
+        for n, moment in enumerate(times)
+    ]
+    checked = [{"line": "gate", "start": 0, "end": 3600, "complete": True}]
+    values = {"video": "in.mp4", "size": [WIDTH, HEIGHT], "lines": [LINE], "checked": checked}
+    path = folder / "corrections.yaml"
+    path.write_text(json.dumps({**values, "end": 3600, "events": events}), encoding="utf-8")
+    found = tuple(
+        Event(at, n, "gate", "in", n, n, "car", 0.9) for n, at in enumerate(times) if n % 3
+    )
+    counts = Counts(found, (("gate", "in"), ("gate", "out")), (), spans=((0.0, 3600.0),))
+
+    def apply() -> None:
+        corrected = apply_corrections({"": counts}, [Corrections.read(path)], settings)[""]
+        assert len(corrected.events) == number
+
+    apply()  # imports
+    begin = time.perf_counter()
+    apply()
+    seconds = time.perf_counter() - begin
+    tracemalloc.start()
+    apply()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return seconds, peak / 1e6
 
 
 def main() -> None:

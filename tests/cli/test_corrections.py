@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from browser import browser, downloaded
 from cli.test_count_command import LINES, write_tracks
 from conftest import Run
 from running import rows_of, write_drive
@@ -166,3 +167,31 @@ def test_a_run_corrects_its_counts_records_and_page(
     assert not (folder / "d.csv").exists()
     result = run("detect-video", clip, "-d", folder / "d", "--corrections", review, code=2)
     assert "--corrections is for one video, without -d" in result.err
+
+
+def test_the_page_of_a_corrected_run_saved_unchanged_corrects_again(
+    run: Run, folder: Path, red: tuple[str, ...]
+) -> None:
+    """A correction that fits nothing is left out, and named; no output is lost."""
+    clip, review, tracks = (folder / name for name in ("red.mp4", "c.yaml", "t.jsonl"))
+    review.write_text(f"{HEAD}{MISSED}")
+    detect = ("detect-video", clip, "--no-video", *red, "-c", folder / "lines.yaml")
+    outputs = ("--tracks", tracks, "--review", folder / "review", "--corrections", review)
+    run(*detect, *outputs, "--counts", folder / "first.csv", code=0)
+    first = [(row["name"], row["direction"], row["class"]) for row in rows_of(folder / "first.csv")]
+    assert ("gate", "in", "truck") in first
+    with browser(folder) as window:
+        window.open(folder / "review" / "review.html")
+        window.type("s")
+        saved = downloaded(folder, "corrections.yaml")
+    count = ("count", tracks, "-c", folder / "lines.yaml", "--counts", folder / "again.csv")
+    run(*count, "--corrections", saved, code=0)
+    again = [(row["name"], row["direction"], row["class"]) for row in rows_of(folder / "again.csv")]
+    assert again == first
+    review.write_text(f"{HEAD}{MISSED}{WRONG.replace('0.52', '1.9')}")
+    late = ("--corrections", review, "--counts", folder / "late.csv", "--strict")
+    result = run(*detect, *late, code=4)
+    assert f"{review}: gate, 1.9 s, out, vehicle: no such event was counted" in result.err
+    assert [(r["name"], r["class"]) for r in rows_of(folder / "late.csv")] == [
+        (name, kind) for name, _, kind in first
+    ]

@@ -1,6 +1,7 @@
 """The page of reviews in a real browser: check, correct, save, reload."""
 
 import re
+import shutil
 from base64 import b64decode
 from collections.abc import Iterator
 from itertools import pairwise
@@ -251,3 +252,55 @@ def test_a_column_repeats_the_end_of_the_one_before(window: Browser) -> None:
     assert layout["lead"] == 0.5
     for before, column in pairwise(columns):
         assert np.abs(before[-rows:] - column[:rows]).mean() < 8
+
+
+def test_a_review_is_opened_again_corrected_saved_and_counted(tmp_path: Path, run: Run) -> None:
+    """The page and the command say the same each time, with its interval."""
+    road = draw_road(tmp_path, [*CARS, Car(130, 80), Car(190, 80)], missed=2, seconds=240)
+    page, fixes = write_review(run, tmp_path, road), tmp_path / "corrections.yaml"
+    count = ("count", road.tracks, "-c", road.settings, "--rate", "10", "--corrections", fixes)
+
+    def said(window: Browser) -> str:
+        """Save, count, and return what both say of the true number."""
+        shown = window.text("#estimate p").removeprefix("all: ").partition(";")[0]
+        window.type("s")
+        downloaded(tmp_path, fixes.name)
+        assert f"at checked lines {shown}\n" in run(*count, code=0).out
+        return shown
+
+    with browser(tmp_path) as window:
+        window.open(page)
+        window.run("get('count').value = 3; draw(); current = 0; refresh()")
+        click_at(window, 8, 0.29)
+        window.run("[current] = planned(); refresh()")
+        window.type(ENTER, ENTER, ENTER)
+        first = said(window)
+        assert first.startswith("5 counted, 6 corrected, ")
+        again = tmp_path / "again"
+        opening = ("--tracks-from", road.tracks, "-c", road.settings, "--corrections", fixes)
+        run("review", road.video, *opening, "-o", again, code=0)
+        fixes.unlink()
+        window.open(again / "review.html")
+        assert said(window) == first
+        fixes.unlink()
+        window.run("current = 0; refresh()")
+        window.type(TAB, "x")
+        assert said(window).startswith("5 counted, 5 corrected, ")
+        fixes.unlink()
+        window.run("data.limit = 100")
+        window.type("s")
+        assert window.text("#hint").startswith("Not saved: the file would have more than 100 bytes")
+    assert not fixes.exists()
+
+
+def test_videos_of_one_name_and_other_tracks_of_a_video_share_nothing(
+    tmp_path: Path, run: Run
+) -> None:
+    keys = set()
+    for name, missed in (("a", None), ("b", None), ("b", 0)):
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        page = write_review(run, folder, draw_road(folder, [Car(2, 80)], missed=missed, seconds=4))
+        keys.add(read_page(page).data["key"])
+        shutil.rmtree(page.parent)
+    assert len(keys) == 3
