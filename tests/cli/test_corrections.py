@@ -50,7 +50,7 @@ def test_corrections_are_truth_for_any_counts_of_the_video(run: Run, folder: Pat
     result = run("eval", "counts", plain, review, code=0)
     assert result.out.splitlines()[-1].split()[3:] == ["1", "1", "0", "0", "1", "100.0", "0.0"]
     result = run(*count, "--corrections", review, "--class", "bus", code=0)
-    assert result.out.splitlines()[1].split()[1:8] == ["gate", "out", *"011", "(1", "to", "1)"]
+    assert result.out.splitlines()[1].split()[1:9] == ["gate", "out", *"011", "(1", "to", "1)"]
     for table, fault in (
         ("time,name,direction,class,id\nsoon,gate,in,,1\n", ":2: time: must be a valid number"),
         ("video,time,name,direction,class,id\na,1,gate,in,car,1\n", ": has several videos"),
