@@ -39,6 +39,8 @@ class Shape:
     width: int = 40
     seconds: float = 0.5
     level: int = 200
+    shade: float | None = None
+    """The factor by which a shadow darkens the road."""
 
     def box(self, time: float) -> Box:
         """Return its box at a time: it comes down the picture."""
@@ -58,7 +60,9 @@ def strips_of(shapes: Sequence[Shape], seconds: float) -> list[Image]:
         row = road.repeat(3, axis=1) + rng.integers(-3, 4, (SAMPLES, 3))
         for shape in shapes:
             if shape.time <= index / RATE < shape.time + shape.seconds:
-                row[shape.left : shape.left + shape.width] = shape.level
+                part = row[shape.left : shape.left + shape.width]
+                grey = np.array([0, 128, 128])  # luma, blue and red
+                part[:] = grey + shape.shade * (part - grey) if shape.shade else shape.level
         strips.append(row[np.newaxis].astype(np.uint8))
     return strips
 
@@ -104,6 +108,7 @@ def test_a_vehicle_that_stands_for_some_seconds_is_one_trace() -> None:
         pytest.param(Shape(10, 70), id="no vehicle drives there"),
         pytest.param(Shape(10, 25, level=103), id="it looks like the road"),
         pytest.param(Shape(7, 15, width=50, seconds=0.55), id="the edge of a tracked vehicle"),
+        pytest.param(Shape(10, 25, shade=0.6), id="a shadow keeps the colour and the texture"),
     ],
 )
 def test_what_is_no_vehicle(shape: Shape) -> None:

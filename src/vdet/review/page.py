@@ -306,7 +306,7 @@ class ReviewRecorder:
         self._folder = tempfile.TemporaryDirectory()
         self._pictures: list[StripPicture] = []
         self._minute = 0
-        self._coding: Coding | None = None
+        self._coding = Coding(full_range=True)  # of strips of images
 
     def __enter__(self) -> Self:
         return self
@@ -322,7 +322,8 @@ class ReviewRecorder:
         if (minute := int(frame.time // _MINUTE)) != self._minute:
             self._end_minute(is_end=False)
             self._minute = minute
-        self._coding = picture.planes.coding if picture.planes else None
+        if picture.planes:
+            self._coding = picture.planes.coding
         self._tracks.append(frame)
         passed = list(map(len, self._passages.by_band))
         self._passages.add(frame)
@@ -412,9 +413,8 @@ class ReviewRecorder:
             way, is_down = "right", strip.band.start[1] < strip.band.end[1]
             across = image[:, :, :: 1 if is_down else -1].transpose(1, 2, 0, 3)
             flat = across.reshape(-1, height, 3)
-        if self._coding:
-            luma, blue, red = (np.ascontiguousarray(layer) for layer in np.moveaxis(flat, 2, 0))
-            flat = self._coding.to_bgr((luma, blue, red))
+        luma, blue, red = (np.ascontiguousarray(layer) for layer in np.moveaxis(flat, 2, 0))
+        flat = self._coding.to_bgr((luma, blue, red))
         picture = StripPicture(number, self._minute, columns, seconds, height, way, lead)
         self._pictures.append(picture)
         self._write(picture.name, self._shown(flat, number))

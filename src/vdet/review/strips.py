@@ -189,14 +189,14 @@ class Sampling:
         return cls(len(x), is_upward, _Map.of(x, y), half)
 
     def cut(self, layers: Sequence[Image]) -> Image:
-        """Return the band of a frame, uint8 `(rows, samples, 3)`.
+        """Return the band of a frame as luma, blue and red, uint8 `(rows, samples, 3)`.
 
-        The layers are the frame, BGR, or its luma, blue and red; so are the channels of the band.
+        The layers are the frame, BGR, or its luma, blue and red.
         """
         first, *chroma = layers
         cut = self._full.cut(first)
         if not chroma:
-            return cut
+            return np.asarray(cv2.cvtColor(cut, cv2.COLOR_BGR2YCrCb)[..., [0, 2, 1]], np.uint8)
         merged = cv2.merge([cut, *map(self._half.cut, chroma)])
         return np.asarray(merged, np.uint8)
 
