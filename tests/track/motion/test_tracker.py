@@ -201,6 +201,20 @@ def test_a_shadow_that_is_taken_for_a_vehicle_keeps_none_that_brakes_over_it() -
     assert id_at(shown[20], cars[20]) == id_at(shown[-1], cars[-1])
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_what_has_left_over_a_side_does_not_come_back_as_another(side: str) -> None:
+    leaving = [inside(place) for place in moving(moved_to(CAR, 120, 400), dx=-3, frames=46)]
+    entering = [inside(place) for place in moving(moved_to(CAR, -20, 400), dx=3, frames=30)]
+    clip = [*leaving, *[None] * 12, *entering]
+    if side == "right":
+        clip = [
+            place and Box(WIDTH - place.x2, *(place.y1, WIDTH - place.x1, place.y2))
+            for place in clip
+        ]
+    shown = follow([place] if place else [] for place in clip)
+    assert [ids(shown[:50]), ids(shown[58:])] == [{1}, {2}]
+
+
 def test_the_size_of_the_frame_does_not_matter() -> None:
     def doubled(box: Box) -> Box:
         return Box.sized(2 * box.x1, 2 * box.y1, 2 * box.width, 2 * box.height)

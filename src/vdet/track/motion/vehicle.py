@@ -34,6 +34,9 @@ _SETTLING_TIME = 0.4
 _APPEARANCE_TIME = 0.3
 """Seconds over which the appearance of the detections is averaged."""
 
+_LEAVING = 0.1
+"""Minimum speed of a vehicle that leaves the frame, in its sizes per second."""
+
 _NOISE = 0.12
 """Standard deviation of the sides of a detection with score 1, as a fraction of the vehicle's size.
 """
@@ -161,10 +164,18 @@ class TrackedVehicle:
         return self.history.estimates[-1].time - self.begin
 
     @property
+    def has_left(self) -> bool:
+        """Whether a side of the frame cut it off when it was last seen, and it was moving out."""
+        last = self.history.last_seen.state
+        return bool((last.velocity * last.ways_in).min() < -_LEAVING)
+
+    @property
     def is_over(self) -> bool:
         """Whether to forget it."""
         if not self.confirmed:
             return self.evidence <= 0
+        if self.has_left:
+            return self.unseen > self._settings.coast_seconds
         in_the_open = self.unseen - self.hidden
         longest = self._settings.keep_hidden_id_seconds
         return in_the_open > self._settings.keep_id_seconds or self.hidden > longest
