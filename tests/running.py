@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -19,6 +19,7 @@ import pytest
 from red_cars import HEIGHT, WIDTH, car_at, road
 from vdet.config.schema import OutputSettings
 from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.frame import Tags
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 
@@ -54,10 +55,13 @@ VideoReader.__iter__ = held
 """
 
 
-def write_drive(path: Path, frames: int, *, noise: bool = False) -> Path:
+def write_drive(
+    path: Path, frames: int, *, noise: bool = False, created: str | None = None
+) -> Path:
     """Write a video of the red car that drives along; with `noise` a frame has some 30 kB."""
     random = np.random.default_rng(1)
     info = VideoInfo(path, WIDTH, HEIGHT, Fraction(25), Fraction(1, 25), frames=frames)
+    info = replace(info, tags=Tags(creation_time=created))
     with VideoWriter(path, info, OutputSettings(preset="ultrafast")) as writer:
         for index in range(frames):
             image = road(car_at(index % 200))

@@ -29,6 +29,18 @@ def records_of(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
 
 
+def test_clocks_that_are_doubtful_are_said_once(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    for hour in (7, 8, 9):
+        video = tmp_path / f"in/20260501_0{hour}0000.mp4"
+        write_drive(video, 6, created="2026-03-01T12:00:00Z")
+    outputs = ("--no-video", "--tracks", ".csv", "--jobs", "1")
+    lines = run("detect-video", video.parent, "-d", tmp_path / "out", *outputs).err.splitlines()
+    (said,) = (line for line in lines if "by its metadata" in line)
+    assert said.startswith(f"vdet: warning: {video.parent}/20260501_070000.mp4: begins ")
+    assert said.endswith("; input.begin overrides it (and 2 more files)")
+
+
 def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     run: Run, clips: Path, tmp_path: Path
 ) -> None:

@@ -49,7 +49,7 @@ def page(
     return VideoPage(
         video=replace(video_info(WIDTH, HEIGHT), path=source), frames=52,
         spans=[(0.0, end - float(1 / video_info(WIDTH, HEIGHT).rate))],
-        records=TWO, thumbnails={1: jpeg_uri(STILL)}, poster=STILL, player=player,
+        records=TWO, thumbnails={1: jpeg_uri(STILL)}, poster=STILL, still=STILL, player=player,
         settings="output:\n  crf: 25\n",
     )  # fmt: skip
 
@@ -177,7 +177,7 @@ class TestVideoPage:
         assert "No frames from 0:01 to 0:02" in seen(replace(page(), spans=[(0, 1), (2, 2)])).text
 
     def test_a_video_without_vehicles_has_a_page_too(self) -> None:
-        empty = replace(page(), records=(), thumbnails={}, poster=None)
+        empty = replace(page(), records=(), thumbnails={}, poster=None, still=None)
         made = seen(empty)
         assert "No vehicle was shown." in made.text
         assert "0vehicles" in made.text

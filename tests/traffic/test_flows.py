@@ -17,7 +17,7 @@ from vdet.config.scene import LineSettings
 from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
-from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
+from vdet.traffic.counts import Counts, count_table, flow_table, per_hour, zone_table
 from vdet.traffic.output import counts_content, flows_content
 from vdet.traffic.tables import write_content
 
@@ -182,6 +182,10 @@ class TestIntervals:
         assert [row.start for row in rows] == [0, 1200, 2400, 3600]
 
 
+def test_less_than_a_minute_of_video_has_no_rate() -> None:
+    assert [per_hour(6, seconds) for seconds in (0, 59.9, 60)] == [None, None, 360.0]
+
+
 class TestFiles:
     @staticmethod
     def write(make: Callable[..., Any], path: Path, *arguments: Any) -> None:
@@ -192,7 +196,7 @@ class TestFiles:
         assert rows_of(tmp_path / "f.csv")[-1] == {
             "start": "2026-05-01 07:00:00.000+02:00", "end": "2026-05-01 07:15:00.000+02:00",
             "from": "west", "to": "'=south", "class": "vehicle", "count": "1",
-            "observed": "10.0", "part": "True", "per_hour": "360.0",
+            "observed": "10.0", "part": "True", "per_hour": "",
         }  # fmt: skip
         self.write(flows_content, tmp_path / "g.csv", {"v": crossing(EAST)})
         assert [row["to"] for row in rows_of(tmp_path / "g.csv")] == ["(none)"]
@@ -240,7 +244,7 @@ class TestFiles:
                     "start": "2026-05-01 07:04:57.000+02:00",
                     "end": "2026-05-01 07:05:07.000+02:00",
                     "from": "east", "to": None, "class": "vehicle", "count": 1,
-                    "observed": 10.0, "part": False, "per_hour": 360.0,
+                    "observed": 10.0, "part": False, "per_hour": None,
                 },
             ],
             "matrix": {"east": {"east": 0, "(none)": 1}},

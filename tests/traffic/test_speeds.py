@@ -131,13 +131,18 @@ def test_a_lost_vehicle_has_no_speed() -> None:
     assert measured(driving(10.0), state="predicted") is None
 
 
-def test_a_vehicle_that_comes_back_after_long_keeps_its_speed() -> None:
+@pytest.mark.parametrize("back", [0.04, 2.0])
+def test_a_vehicle_that_comes_back_after_long_keeps_its_speed(back: float) -> None:
     meter = SpeedMeter(GROUND, WIDTH, HEIGHT)
-    for time in (*np.arange(0, 2, 0.04), 60.0):
-        ((x, y),) = seen(np.array([(0.0, 16 + 10 * min(time, 3.0))])).tolist()
+    for time in (*np.arange(0, 2, 0.04), *np.arange(60, 60 + back, 0.04)):
+        ((x, y),) = seen(np.array([(0.0, 16 + 10 * (time % 60))])).tolist()
         box = Box(x - 20, y - 40, x + 20, y)
         meter.add(FrameTracks(round(25 * time), time, (Track(1, box, 0.9, "detected"),)))
-    assert meter.speeds()[1].quantile(0.5) == pytest.approx(10.0, rel=0.02)
+    found = meter.speeds()[1]
+    assert found.quantile(0.5) == pytest.approx(10.0, rel=0.02)
+    assert found.metres == pytest.approx(18.0 if back < 1 else 36.0, rel=0.06)
+    speeds = [found.at(time) for time in (1.0, 30.0, 61.0)]
+    assert [speed is not None for speed in speeds] == [True, False, back > 1]
 
 
 @pytest.mark.parametrize(

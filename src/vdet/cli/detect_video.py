@@ -275,14 +275,17 @@ def _process_videos(
     if scheduler:
         workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
     results = run_batch(plan, workers=workers, threads=max(1, cores // jobs))
-    failed, is_doubtful = 0, False
+    failed, is_doubtful, clocks = 0, False, list[str]()
     with progress_bars(" files") as progress, closing(results):
         advance = progress("", len(plan.runs))
         for run, record in results:
-            _print_result(run, record)
+            clocks += _print_result(run, record)
             failed += record.error is not None
             is_doubtful |= record.is_doubtful
             advance(1)
+    if clocks:
+        more = f" (and {quantity(len(clocks) - 1, 'more file')})" if len(clocks) > 1 else ""
+        LOG.warning("%s%s", clocks[0], more)
     done, skipped = len(plan.runs) - failed, len(plan.skipped)
     also = f"{skipped} skipped, " if skipped else ""
     announce(f"{plan.folder}: {quantity(done, 'file')} done, {also}{failed} failed")
@@ -302,12 +305,18 @@ def _checked_ending(output: Output) -> Output:
     return Output(sink, Path(ending))
 
 
-def _print_result(run: "Run", record: "ManifestRecord") -> None:
+def _print_result(run: "Run", record: "ManifestRecord") -> list[str]:
+    """Print what a record says, and return its warnings about the clock, for one of all files."""
+    from vdet.traffic.clock import OVERRIDE
+
+    clocks = [warning for warning in record.warnings if warning.endswith(OVERRIDE)]
     for warning in record.warnings:
-        LOG.warning("%s", warning)
+        if warning not in clocks:
+            LOG.warning("%s", warning)
     if record.error:
         LOG.error("%s", record.error)
-        return
+        return clocks
     numbers = f"{quantity(record.frames or 0, 'frame')}, {quantity(record.tracks or 0, 'track')}"
     begin = f", begins {record.begin}" if record.begin and run.settings.traffic else ""
     announce(f"{run.source}: {numbers}, {record.seconds:.1f} s{begin}")
+    return clocks

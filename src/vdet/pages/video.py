@@ -64,8 +64,9 @@ class VideoPage:
         The parts with video, from the first to the last frame, seconds as in the tracks.
     thumbnails
         By id, the image of the vehicle as a data URI. A vehicle may have none.
-    poster
-        The frame with the most vehicles, BGR uint8; None without frames.
+    poster, still
+        The frame with the most vehicles, BGR uint8, and a copy with their boxes; None without
+        frames.
     settings
         The settings of the run as YAML.
     survey
@@ -92,6 +93,7 @@ class VideoPage:
     records: Sequence[VehicleRecord]
     thumbnails: Mapping[int, str]
     poster: Image | None
+    still: Image | None
     player: Player | None
     settings: str
     survey: Survey | None = None
@@ -117,7 +119,7 @@ class VideoPage:
             "frames": self.frames,
             "vehicles": len(self._moved),
             "max_at_once": self._max_at_once,
-            "still": NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
+            "still": NO_STILL if self.still is None else jpeg_uri(self.still, _SMALL),
             "counts": self._totals,
             "conditions": [item.text for item in self.findings if item.severity == "warning"],
             "rows": self._rows(self.pictures),

@@ -72,7 +72,7 @@ class Track:
 
     def label(self, parts: Sequence[str]) -> str:
         """Return the text of a label: those of the parts id, class, score, distance it has."""
-        texts = {"id": f"#{self.id}", "class": self.class_name, "score": f"{self.score:.2f}"}
+        texts = {"id": str(self.id), "class": self.class_name, "score": f"{self.score:.2f}"}
         texts["distance"] = None if self.distance is None else f"{self.distance:.0f} m"
         return " ".join(text for part in parts if (text := texts[part]))
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _log = logging.getLogger("vdet")
 _SAME = timedelta(minutes=1)
 """Maximum difference between the times in the name and the metadata without a warning."""
+OVERRIDE = "input.begin overrides it"
+"""End of the warnings about clocks."""
 _CREATED = "its creation time"
 _EXPORTED, _FUTURE = f"{_CREATED}, perhaps of an export", f"{_CREATED}, in the future"
 
@@ -114,7 +116,7 @@ def find_clock(
         zone = begin.tzinfo
     found_clock = Clock(_utc(begin, zone), source, zone)
     if found_clock.is_doubtful:
-        _log.warning("%s: may not begin %s; input.begin overrides it", path, found_clock)
+        _log.warning("%s: may not begin %s; %s", path, found_clock, OVERRIDE)
     return found_clock
 
 
@@ -143,11 +145,10 @@ def _begin_by_name(
         later = _utc(written, zone) - _utc(named, zone)
         if min(abs(later), abs(later - timedelta(seconds=float(length or 0)))) > _SAME:
             _log.warning(
-                "%s: begins %s by its name, %s by its metadata; using the name; input.begin "
-                "overrides it",
+                "%s: begins %s by its name, %s by its metadata; using the name; %s",
                 path,
-                _time_text(_utc(named, zone).astimezone(zone)),
-                _time_text(_utc(written, zone).astimezone(zone)),
+                *(_time_text(_utc(time, zone).astimezone(zone)) for time in (named, written)),
+                OVERRIDE,
             )
     return named, "from its name"
 

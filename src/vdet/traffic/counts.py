@@ -600,8 +600,8 @@ def minutes(seconds: float) -> str:
 
 
 def per_hour(count: float, seconds: float) -> float | None:
-    """Return the number of vehicles per hour of video; None without video."""
-    return round(3600 * count / seconds, 1) if seconds else None
+    """Return the number of vehicles per hour of video; None with less than a minute of it."""
+    return round(3600 * count / seconds, 1) if seconds >= 60 else None
 
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:

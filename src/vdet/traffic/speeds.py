@@ -104,13 +104,14 @@ class Speeds:
     @property
     def deviation(self) -> float:
         """The standard deviation of the median speed, m/s."""
-        windows = max(1.0, (self.times[-1] - self.times[0]) / WINDOW)
+        windows = max(1.0, float(self._steps.sum()) / WINDOW)
         scatter = np.median(self.deviations) / np.sqrt(windows)
         return float(np.hypot(scatter, self.common * self.quantile(0.5)))
 
     def at(self, time: float) -> tuple[float, float] | None:
         """Return the speed and its standard deviation at a time, m/s; None if unknown."""
-        if not self.times[0] <= time <= self.times[-1]:
+        after = int(np.searchsorted(self.times, time))
+        if not self.times[0] <= time <= self.times[-1] or not self._steps[after]:
             return None
         speed = float(np.interp(time, self.times, self.speeds))
         scatter = float(np.interp(time, self.times, self.deviations))
@@ -129,8 +130,22 @@ class Speeds:
     @property
     def _covered(self) -> Float64Array:
         """Metres covered at each time: half of those to the times before and after it."""
+        return np.asarray(self.speeds * (self._steps[:-1] + self._steps[1:]) / 2, np.float64)
+
+    @property
+    def _steps(self) -> Float64Array:
+        """Seconds before and after each time, `(n + 1,)`; 0 where the vehicle was away."""
         steps = np.diff(self.times, prepend=self.times[0], append=self.times[-1])
-        return np.asarray(self.speeds * (steps[:-1] + steps[1:]) / 2, np.float64)
+        return np.where(steps < _GONE, steps, 0.0)
+
+    def then(self, later: "Speeds") -> "Speeds":
+        """Return these speeds of a vehicle, and those after it returned."""
+        names = "times", "positions", "speeds", "deviations"
+        arrays = {
+            name: np.concatenate([getattr(self, name), getattr(later, name)]) for name in names
+        }
+        length = float(np.fmax(self.length, later.length))
+        return Speeds(**arrays, common=max(self.common, later.common), length=length)
 
 
 class SpeedMeter:
@@ -169,7 +184,8 @@ class SpeedMeter:
 
     def _measured(self, number: int) -> Speeds | None:
         rows = np.array(self._rows[number]).reshape(-1, _COLUMNS)
-        return measure(self.ground, rows) or self._gone.get(number)
+        latest, earlier = measure(self.ground, rows), self._gone.get(number)
+        return earlier.then(latest) if earlier and latest else latest or earlier
 
 
 def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:

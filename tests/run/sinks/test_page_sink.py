@@ -81,9 +81,18 @@ def test_the_still_is_the_first_frame_that_shows_the_most_vehicles(tmp_path: Pat
         result_of(*[CAR] * min(n, 1), image=image, index=n, time=Fraction(n, 25))
         for n, image in enumerate(images)
     ]
-    write(Output("page", tmp_path / "page"), results)
-    (still,) = page_of(tmp_path / "page").all("img", **{"class": "still"})
+    source = tmp_path / "red.mp4"
+    source.touch()
+    write(Output("page", tmp_path / "page"), results, video=replace(video_info(), path=source))
+    made = page_of(tmp_path / "page")
+    (still,), (video,) = made.all("img", **{"class": "still"}), made.all("video")
     assert picture(still["src"]).mean() > 150
+    poster, plain = (picture(uri).astype(int) for uri in (video["poster"], still["src"]))
+    differs = np.abs(poster - plain).max(axis=2) > 20
+    x1, y1, x2, y2 = CAR.pixels
+    assert differs[y1:y2, x1].all(), "the poster has a box around the vehicle"
+    differs[y1 - 8 : y2 + 8, x1 - 8 : x2 + 8] = False
+    assert not differs.any()
 
 
 def test_coarse_pages_have_no_readable_faces_or_plates(tmp_path: Path) -> None:

@@ -181,7 +181,7 @@ class PageSink(BaseSink):
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.traffic
-        review = self.context.path_of("review")
+        review, poster = self.context.path_of("review"), self.context.poster.image(traffic.vehicles)
         return VideoPage(
             video=self.video,
             frames=self._frames,
@@ -192,7 +192,8 @@ class PageSink(BaseSink):
                 for record in longest(traffic.vehicles)
                 if record.id in self._pictures
             },
-            poster=self.context.poster.image(traffic.vehicles),
+            poster=poster,
+            still=self.context.poster.with_boxes(poster),
             player=self._player(),
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
             survey=self.context.survey,

@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.media import Picture
 from vdet.media.images import coarse_scale, shrunk
 from vdet.run.result import FrameResult
 from vdet.traffic.records import VehicleRecord
@@ -17,25 +16,32 @@ class Poster:
 
     def __init__(self, *, is_coarse: bool) -> None:
         self._is_coarse = is_coarse
-        self._picture: Picture | None = None
-        self._vehicles = 0
+        self._best: FrameResult | None = None
 
     def add(self, result: FrameResult) -> None:
         """Add a frame."""
-        if self._picture is None or len(result.tracks) > self._vehicles:
-            self._picture, self._vehicles = result.frame.picture, len(result.tracks)
+        if self._best is None or len(result.tracks) > len(self._best.tracks):
+            self._best = result
 
     def image(self, vehicles: Iterable[VehicleRecord]) -> Image | None:
         """Return the frame, BGR uint8, at its own size; None without frames.
 
         `vehicles` are all of the video: no detail is kept that would show their plates.
         """
-        if self._picture is None:
+        if self._best is None:
             return None
-        image, boxes = self._picture.image, [vehicle.largest for vehicle in vehicles]
+        image, boxes = self._best.frame.image, [vehicle.largest for vehicle in vehicles]
         if not self._is_coarse:
             return image
         height, width = image.shape[:2]
         largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
         reduced = shrunk(image, coarse_scale(largest, height))
         return np.asarray(cv2.resize(reduced, (width, height)), np.uint8)  # marks are drawn on it
+
+    def with_boxes(self, image: Image | None) -> Image | None:
+        """Return a copy of the frame, as `image` returns it, with a box around each vehicle."""
+        if self._best is None or image is None:
+            return None
+        drawn = image.copy()
+        self._best.draw_tracks(drawn, ())
+        return drawn
