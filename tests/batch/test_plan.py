@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from clips import write_clip
+from running import write_drive
 from vdet.batch.run import Plan, find_sources, make_plan
 from vdet.batch.task import ManifestRecord, Written, open_manifest
 from vdet.errors import BatchError, OutputError
@@ -312,6 +314,17 @@ class TestFound:
             ("clips/day1/evening/d.ts", "day1/evening/d.ts"),
             ("clips/day2/c.avi", "day2/c.avi"),
         ]
+
+    def test_clips_that_vdet_cut_are_taken_by_name_only(self) -> None:
+        for folder in ("mine", "theirs"):
+            Path(folder).mkdir()
+        name = "clip-00-00-01-car-1.mp4"
+        write_drive(Path("mine") / name, 2)
+        write_clip(Path("theirs") / name, count=2)
+        taken = [(f"{folder}/{name}", name) for folder in ("theirs", "mine")]
+        assert found("theirs", f"mine/{name}") == taken
+        with pytest.raises(BatchError, match="mine: no video found"):
+            found("mine")
 
     def test_a_file_whose_name_looks_like_a_pattern_is_itself(self) -> None:
         assert found("odd [1].mp4") == [("odd [1].mp4", "odd [1].mp4")]

@@ -1,6 +1,5 @@
 """The page of a video."""
 
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,13 +12,13 @@ import numpy as np
 import pytest
 
 from browser import browser
+from clips import write_clip
 from pages.html import Elements, needs_chromium, title_in_chromium
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.findings import Finding
-from vdet.pages.counts import counts_page
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.track.track import FrameTracks
@@ -256,35 +255,35 @@ class TestFindings:
         assert made.summary["vehicles"] == 1
 
 
-@needs_chromium
-@pytest.mark.parametrize("player", [VIDEO, None])
-def test_the_times_of_its_vehicles_seek_the_player(tmp_path: Path, player: Player | None) -> None:
-    path = tmp_path / "page.html"
-    reads = """<script>document.title = JSON.stringify([...document.querySelectorAll("#found tr")]
-      .slice(1).map(row => [row.querySelector("img") !== null,
-        row.querySelector("a")?.dataset.time ?? null, row.innerText.trim()]))</script></body>"""
-    path.write_text(page(player=player).html().replace("</body>", reads), "utf-8")
-    times = ["0.000", "2.000"] if player else [None, None]
-    assert json.loads(title_in_chromium(path)) == [
-        [True, times[0], "#1\tvehicle\t0:00:00\t2.0\tleft\tnear"],
-        [False, times[1], "#2\ttruck\t0:00:02\t0.1\tleft\tfar"],
-    ]  # fmt: skip
-
-
-def test_doubts_come_before_tables_on_the_first_page_of_paper(tmp_path: Path) -> None:
-    dark = Finding("dark", "the image is dark", spans=((0.0, 1.0),))
-    counts = replace(counted(("gate", "in", 1.0), ("gate", "out", 1.2)), findings=(dark,))
-    made = replace(page(), survey=survey(counts), findings=(dark,))
-    with browser(tmp_path, 794, 1123) as window:  # A4 at 96 dpi
-        for html in (made.html(), counts_page(survey(counts), STILL)):
-            (path := tmp_path / "page.html").write_text(html, "utf-8")
-            window.visit(path)
-            window.show_print()
-            doubts, *others = window.run(
-                "return ['.problems', 'h2 ~ .still', 'h2 ~ .wide'].map(selector =>"
-                " document.querySelector(selector).getBoundingClientRect().bottom)"
-            )
-            assert doubts < min(*others, 1123)
+@pytest.mark.parametrize(
+    ("player", "is_there", "links"),
+    [
+        (VIDEO, True, ["#t=0.000", "#t=2.000"]),
+        (VIDEO, False, ["clip-1.mp4", None]),
+        (None, False, ["clip-1.mp4", None]),
+    ],
+)
+def test_a_time_seeks_the_player_or_opens_the_clip(
+    tmp_path: Path, player: Player | None, is_there: bool, links: list[str | None]
+) -> None:
+    path = tmp_path / "a.page" / "page.html"
+    path.parent.mkdir()
+    made = replace(page(player=player), clips={1: "../a.clips/clip-1.mp4"})
+    path.write_text(made.html(), "utf-8")
+    if is_there:
+        write_clip(tmp_path / "a.mp4")
+    reads = """return [...document.querySelectorAll("#found tbody tr")].map(row => [
+      row.querySelector("img") !== null,
+      row.cells[3].querySelector("a")?.getAttribute("href").split("/").pop() ?? null,
+      row.innerText.trim()]);"""
+    with browser(tmp_path) as window:
+        window.visit(path)
+        if player and not is_there:
+            window.wait("return !document.getElementById('unplayable').hidden")
+        assert window.run(reads) == [
+            [True, links[0], "#1\tvehicle\t0:00:00\tclip\t2.0\tleft\tnear"],
+            [False, links[1], "#2\ttruck\t0:00:02\t\t0.1\tleft\tfar"],
+        ]
 
 
 @needs_chromium

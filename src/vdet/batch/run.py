@@ -26,6 +26,7 @@ from vdet.media.demux import reject_address
 from vdet.media.images import IMAGE_SUFFIXES, numbered_images
 from vdet.run.inputs import input_files
 from vdet.run.sinks import Output
+from vdet.run.sinks.folders import is_clip
 from vdet.run.sinks.protocol import BatchTotal, check_sinks, sink_kind
 from vdet.run.video import Run
 from vdet.workers import Workers, call_all
@@ -60,7 +61,8 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     * a folder: the videos in it, recursively, without hidden files and folders. A folder that has
       numbered images and no videos is a video itself.
 
-    Videos that vdet wrote beside their sources are skipped, unless they are passed by name.
+    Videos that vdet wrote beside their sources, and clips that it cut, are skipped, unless they are
+    passed by name.
     Folders of several kinds of images are skipped with a warning (logger "vdet").
 
     Raises
@@ -114,7 +116,7 @@ def _images_in(folder: Path, base: Path) -> Iterator[InputVideo]:
 
 
 def _is_video(path: Path) -> bool:
-    is_skipped = path.name.startswith(".") or path.stem.endswith(DRAWN)
+    is_skipped = path.name.startswith(".") or path.stem.endswith(DRAWN) or is_clip(path)
     return path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not is_skipped
 
 

@@ -5,7 +5,7 @@ import os
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from fractions import Fraction
@@ -86,6 +86,24 @@ _EXPORTER = re.compile(
 for streaming.
 """
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
+
+
+PLAYED_AUDIO = {"aac", "mp3", "opus", "flac"}
+"""Codecs that browsers play in an `.mp4` file."""
+_PLAYED = {"h264", "vp9", "av1"}
+
+
+def codec_name(stream: Stream) -> str | None:
+    """Return the name of the codec of a stream, whichever decoder is used; None if unknown."""
+    codec = stream.codec_context
+    return codec.codec.canonical_name if codec else None
+
+
+def plays_in_some_browser(path: Path) -> bool:
+    """Return whether there are browsers that play a video file."""
+    with closing(Demuxer(path)) as demuxer:
+        is_read = demuxer.container.format.name.startswith(("mov,", "matroska,"))
+        return is_read and codec_name(demuxer.video) in _PLAYED | {"hevc", "vp8"}
 
 
 def moving_streams(container: InputContainer) -> list[VideoStream]:
@@ -266,6 +284,14 @@ class Demuxer:
     def close(self) -> None:
         """Close the file."""
         self.container.close()
+
+    @property
+    def plays(self) -> bool:
+        """Whether every browser plays its streams in an `.mp4` file."""
+        codecs = {codec_name(stream) for stream in self.container.streams.audio}
+        pixels = self.video.codec_context.pix_fmt
+        is_played = codec_name(self.video) in _PLAYED and pixels in ("yuv420p", "yuvj420p")
+        return is_played and codecs <= PLAYED_AUDIO
 
     def packets(
         self, streams: Sequence[Stream], on_error: Callable[[], None] = lambda: None

@@ -19,7 +19,7 @@ from av.video.reformatter import ColorRange
 
 from vdet.config.schema import OutputSettings, Settings
 from vdet.errors import OutputError, VideoError
-from vdet.media.demux import SAFELY, Decoder, Demuxer
+from vdet.media.demux import PLAYED_AUDIO, SAFELY, Decoder, Demuxer, codec_name
 from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Frame, VideoInfo
 from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
@@ -31,8 +31,8 @@ _log = logging.getLogger("vdet")
 class AudioCopy:
     """Copies the packets of every audio stream of `source` to `target`, bit for bit.
 
-    Streams that the target does not support are encoded as AAC; so is PCM in mp4, which few
-    programs play. Times stay relative to the video: second `origin` of the source becomes second 0
+    Streams that the target does not support are encoded as AAC; so are those that browsers do not
+    play in mp4. Times stay relative to the video: second `origin` of the source becomes second 0
     of the target. Earlier packets are dropped, except one if the target can hide it (mp4 and mov),
     because a decoder needs it to start. Damaged packets, and empty streams, are dropped with a
     warning (logger "vdet"). Create it before anything is written to `target`.
@@ -82,8 +82,8 @@ class AudioCopy:
             if not (codec and codec.sample_rate):
                 name = codec.name if codec else "unknown codec"
                 _log.warning("%s: its audio (%s) is empty; left out", self._path, name)
-            elif codec.name in target.supported_codecs and not (
-                target.format.name == "mp4" and codec.name.startswith("pcm_")
+            elif codec.name in target.supported_codecs and (
+                target.format.name != "mp4" or codec_name(stream) in PLAYED_AUDIO
             ):
                 streams[stream.index] = target.add_stream_from_template(stream)
             else:
@@ -321,22 +321,17 @@ _AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may 
 _MOST_REORDERED = 17  # frames in H.264 and H.265, and one
 
 
-def copied_suffix(source: Path) -> str | None:
-    """Return the suffix of copied parts of a video; None if they must be encoded.
+def can_be_copied(source: Path) -> bool:
+    """Return whether parts of a video can be copied into an `.mp4` file that browsers play.
 
-    It is that of the source, or .mkv. Copies need a file with times of its own, one clock, and key
-    frames that are shown.
+    Copies need a file with times of its own, one clock, and key frames that are shown.
     """
     if not source.is_file() or is_image_name(source):
-        return None
+        return False
     decoder = Decoder(source, None)
     with closing(decoder.demuxer) as demuxer:
-        if demuxer.may_restart or demuxer.is_raw or decoder.lacks_shown_times:
-            return None
-        if not decoder.shows_key_frame():
-            return None
-    suffix = source.suffix.lower()
-    return suffix if suffix in VIDEO_SUFFIXES else ".mkv"
+        has_times = not (demuxer.may_restart or demuxer.is_raw or decoder.lacks_shown_times)
+        return has_times and demuxer.plays and decoder.shows_key_frame()
 
 
 def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> None:
@@ -370,6 +365,9 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
                 max(int(start * av.time_base), demuxer.container.start_time or 0)
             )
             for packet in _moved_to_zero(demuxer.packets(streams), demuxer.video, end):
+                if packet.stream_index == demuxer.video.index and not packet.duration:
+                    # An `.mp4` file would hide a last frame without a duration.
+                    packet.duration = round(1 / (demuxer.rate * packet.time_base))
                 packet.stream = targets[packet.stream_index]
                 written.mux(packet)
         except (ValueError, av.FFmpegError) as error:

@@ -42,19 +42,22 @@ class VideoRows:
     name
         Name of the video.
     page
-        Address of its page: empty for this page, None if it has no player.
+        Address of its page; empty for this page.
+    plays
+        Whether the page has a player.
     start
         Time in the video at which the player begins, seconds.
     """
 
     name: str
-    page: str | None
+    page: str
+    plays: bool
     start: float
     rows: Sequence[Row]
 
     def addresses(self, column: str) -> list[str]:
         """Return the addresses in a column of the rows, relative to the page of the table."""
-        folder = (self.page or "").removesuffix(PAGE_NAME)
+        folder = self.page.removesuffix(PAGE_NAME)
         return [row[column] and folder + row[column] for row in self.rows]
 
 
@@ -74,6 +77,7 @@ def table_json(parts: Sequence[VideoRows]) -> str:
     table = {
         "names": [part.name for part in parts],
         "pages": [part.page for part in parts],
+        "plays": [part.plays for part in parts],
         "starts": [part.start for part in parts],
         "counts": [len(part.rows) for part in parts],
         **{name: values for name, values in columns.items() if _has_values(values)},
@@ -129,7 +133,9 @@ def write_index(videos: Summaries, target: Path) -> None:
     listed = _listed(videos)
     counts = sum((Counter(video.facts["counts"]) for video in listed), Counter[str]())
     parts = [
-        VideoRows(video.name, video.address, video.facts["start"], video.facts["rows"])
+        VideoRows(
+            video.name, video.address, *(video.facts[key] for key in ("plays", "start", "rows"))
+        )
         for video in listed
     ]
     html = render(

@@ -114,6 +114,7 @@ class VideoPage:
     def summary(self) -> dict[str, Any]:
         """What the page over many videos shows of this one, as values for JSON."""
         return {
+            "plays": self.player is not None,
             "start": self.player.start if self.player else 0.0,
             "seconds": max(0.0, self.seconds),
             "frames": self.frames,
@@ -170,7 +171,7 @@ class VideoPage:
         shown = longest(self.records)
         x = charts.time_axis(self.start, self.end, self.to_clock)
         rows = self._rows(self.thumbnails)
-        page, start = ("", self.player.start) if self.player else (None, 0.0)
+        start = self.player.start if self.player else 0.0
         return render(
             "video.html",
             page=self,
@@ -185,7 +186,7 @@ class VideoPage:
             color_of=color_of,
             traffic=self._traffic(),
             paths=self._paths(),
-            table=table_json([VideoRows("", page, start, rows)]),
+            table=table_json([VideoRows("", "", self.player is not None, start, rows)]),
         )
 
     @property

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clips import write_clip
 from pages.html import Elements
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
 from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
@@ -68,10 +69,24 @@ def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path
     assert min(times) >= 1, "the source is there from its beginning"
 
 
-def test_numbered_images_are_no_video_to_show(tmp_path: Path) -> None:
-    numbered = replace(video_info(), path=tmp_path / "img_%04d.png")
-    write(Output("page", tmp_path / "page"), [result_of(CAR)], video=numbered)
-    assert page_of(tmp_path / "page").all("video") == []
+@pytest.mark.parametrize(
+    ("name", "codec", "plays"),
+    [
+        ("img_%04d.png", "", False),
+        ("in.avi", "mpeg4", False),
+        ("in.ts", "libx264", False),
+        ("in.mkv", "libx264", True),
+        ("in.mov", "libx264", True),
+    ],
+)
+def test_a_source_that_no_browser_plays_is_no_video_to_show(
+    tmp_path: Path, name: str, codec: str, plays: bool
+) -> None:
+    if codec:
+        write_clip(tmp_path / name, codec=codec)
+    video = replace(video_info(), path=tmp_path / name)
+    write(Output("page", tmp_path / "page"), [result_of(CAR)], video=video)
+    assert len(page_of(tmp_path / "page").all("video")) == plays
 
 
 def test_the_still_is_the_first_frame_that_shows_the_most_vehicles(tmp_path: Path) -> None:
@@ -81,8 +96,7 @@ def test_the_still_is_the_first_frame_that_shows_the_most_vehicles(tmp_path: Pat
         result_of(*[CAR] * min(n, 1), image=image, index=n, time=Fraction(n, 25))
         for n, image in enumerate(images)
     ]
-    source = tmp_path / "red.mp4"
-    source.touch()
+    source = write_clip(tmp_path / "red.mp4")
     write(Output("page", tmp_path / "page"), results, video=replace(video_info(), path=source))
     made = page_of(tmp_path / "page")
     (still,), (video,) = made.all("img", **{"class": "still"}), made.all("video")

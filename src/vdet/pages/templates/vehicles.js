@@ -65,10 +65,11 @@ function timeText(i) {
   return `${Math.floor(seconds / 3600)}:${pad(Math.floor(seconds / 60) % 60)}:${pad(seconds % 60)}`;
 }
 
-// Return the address of the first moment of a vehicle in the page of its video; null without a player.
+// Return the address of the first moment of a vehicle in the page of its video; without a player, of its clip or the page.
 function moment(i) {
-  const page = data.pages[data.video[i]];
-  return page === null ? null : `${page}#t=${Math.max(0, data.first[i] - data.starts[data.video[i]]).toFixed(3)}`;
+  const [page, start] = [data.pages[data.video[i]], data.starts[data.video[i]]];
+  if (!data.plays[data.video[i]]) return data.clip[i] || page;
+  return `${page}#t=${Math.max(0, data.first[i] - start).toFixed(3)}`;
 }
 
 // Return the row numbers that pass all filters. Filters that are empty are skipped.

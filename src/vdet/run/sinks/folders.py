@@ -15,9 +15,9 @@ from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
-from vdet.media.demux import is_pipe
+from vdet.media.demux import is_pipe, plays_in_some_browser
 from vdet.media.images import encode_image, is_image_name
-from vdet.media.writer import copied_suffix, copy_part, encode_part, is_marked
+from vdet.media.writer import can_be_copied, copy_part, encode_part, is_marked
 from vdet.pages.batch import write_index, write_reviews
 from vdet.pages.render import PAGE_NAME, REVIEW_NAME, link_to, thumbnail, webp_uri
 from vdet.pages.video import Player, VideoPage, longest
@@ -207,10 +207,11 @@ class PageSink(BaseSink):
         )
 
     def _player(self) -> Player | None:
-        """Return the video that this run writes, else the source if it is a video file."""
+        """Return the video that this run writes, else the source if a browser plays it."""
         source = self.video.path
         drawn = self.context.path_of("video")
-        if not drawn and (not source.is_file() or is_image_name(source)):
+        is_file = source.is_file() and not is_image_name(source)
+        if not drawn and not (is_file and plays_in_some_browser(source)):
             return None
         path, start = source, 0.0
         if drawn:
@@ -291,11 +292,11 @@ class ClipSink(BaseSink):
             raise OutputError(f"{self.video.path}: {what}; save it to a file first")
         self._state = _state(self.video.path)
         is_exact = context.settings.clips.exact
-        self._copied_suffix = None if is_exact else copied_suffix(self.video.path)
+        self._is_copied = not is_exact and can_be_copied(self.video.path)
 
     def finish(self) -> None:
         """Write the clips. One that cannot be cut is left out, with a warning."""
-        folder = self.context.files.stage_folder(self.path, _is_clip)
+        folder = self.context.files.stage_folder(self.path, is_clip)
         source = self.video.path
         if _state(source) != self._state:
             log.warning("%s: changed during the run, so no clips were cut out of it", source)
@@ -317,26 +318,26 @@ class ClipSink(BaseSink):
         video, sides = self.video, (scene.start, scene.end)
         start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
         end += 1 / video.rate / 2  # the frame at the end is shown too
-        if self._copied_suffix:
-            target = stem.with_name(stem.name + self._copied_suffix)
+        target = stem.with_name(f"{stem.name}.mp4")
+        if self._is_copied:
             try:
                 copy_part(video.path, video.start + start, video.start + end, target)
                 return target
             except OutputError as error:
                 target.unlink(missing_ok=True)
                 log.debug("%s; encoded instead", error)
-        target = stem.with_name(f"{stem.name}.mp4")
         name, first = self.path / target.name, max(start, Fraction(0))
         encode_part(video.path, first, end, target, self.context.settings, name=name)
         return target
 
 
-def _is_clip(path: Path) -> bool:
+def is_clip(path: Path) -> bool:
+    """Return whether a file is a clip that vdet wrote."""
     return _CLIP_NAME.fullmatch(path.name) is not None and is_marked(path)
 
 
 def _may_replace(path: Path) -> bool:
-    return _is_clip(path) or _CLIP_NAME.fullmatch(path.name) is None
+    return is_clip(path) or _CLIP_NAME.fullmatch(path.name) is None
 
 
 def _state(path: Path) -> tuple[int, int, int, int] | None:
