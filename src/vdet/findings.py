@@ -87,14 +87,11 @@ class Findings:
         Whether the camera stood still.
     facts
         What is a finding only at other settings.
-    nothing_moved
-        Whether nothing moved before the camera, and it stood still.
     """
 
     items: tuple[Finding, ...] = ()
     is_still: bool = False
     facts: tuple[Finding, ...] = ()
-    nothing_moved: bool = False
 
     def record(self) -> list[dict[str, Any]]:
         """Return them as values for JSON."""

@@ -101,6 +101,8 @@ def test_with_strict_a_failed_file_decides_the_exit_code_before_a_doubtful_one(
     monkeypatch.setattr("vdet.batch.task.ManifestRecord.is_doubtful", True)
     arguments = ("detect-video", clips / "a.mp4", "--no-video", "--tracks", ".csv", "--strict")
     assert run(*arguments, "-d", tmp_path / "doubtful").code == 4
+    again = run(*arguments, "-d", tmp_path / "doubtful", "--skip-existing", code=4)
+    assert "0 files done, 1 skipped (1 doubtful), 0 failed" in again.err
     (clips / "bad.mp4").write_bytes(b"no video")
     assert run(*arguments, clips / "bad.mp4", "-d", tmp_path / "failed").code == 3
 

@@ -42,7 +42,6 @@ def test_a_vehicle_that_was_not_found_is_said_with_its_time_and_its_line() -> No
     assert (finding.code, finding.severity, finding.value) == ("nothing-found", "warning", 1.0)
     assert "at least 1 thing moved here, 1 across gate" in finding.text
     assert np.allclose(finding.spans, [(0, 9)], atol=1)
-    assert not watch.nothing_moved
 
 
 @pytest.mark.parametrize(
@@ -64,15 +63,13 @@ def test_what_is_no_vehicle_is_only_noted(place: Place, soft: float) -> None:
     ids=["an empty road", "what stands"],
 )
 def test_a_still_scene_has_no_doubt(place: Place) -> None:
-    watch = watched(place)
-    assert watch.findings() == []
-    assert watch.nothing_moved
+    [finding] = watched(place).findings()
+    assert str(finding) == "no vehicle was found, and nothing moved [nothing-found]"
+    assert finding.severity == "note"
 
 
 def test_what_is_tracked_is_explained_whatever_its_class() -> None:
-    watch = watched(ACROSS, tracked=ACROSS)
-    assert watch.findings() == []
-    assert not watch.nothing_moved
+    assert watched(ACROSS, tracked=ACROSS).findings() == []
 
 
 def test_rain_is_no_vehicle() -> None:

@@ -1,6 +1,6 @@
 """Every doubt about a video is said at every step: 35 cells of a table."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -71,17 +71,41 @@ def clean() -> list[Image]:
     return [renderer.image(index) for index in range(FRAMES)]
 
 
+def write_frames(path: Path, images: Sequence[Image]) -> None:
+    info = VideoInfo(path, *SIZE, Fraction(RATE), Fraction(1, RATE), frames=len(images))
+    with VideoWriter(path, info, OutputSettings()) as writer:
+        for index, image in enumerate(images):
+            picture = Picture(np.ascontiguousarray(image))
+            writer.write(Frame(index, Fraction(index, RATE), picture))
+
+
+def test_a_still_scene_is_said_where_its_count_of_0_is(
+    tmp_path: Path, run: Program, clean: list[Image], caplog: pytest.LogCaptureFixture
+) -> None:
+    clip, tracks, gate = (tmp_path / name for name in ("in.mp4", "tracks.jsonl", "gate.yaml"))
+    write_frames(clip, [clean[0]] * FRAMES)
+    gate.write_text(render_settings(SETTINGS))
+    names = "c.xlsx", "page"
+    written = (
+        Output(sink, tmp_path / name) for sink, name in zip(("counts", "page"), names, strict=True)
+    )
+    run_video(Run(clip, (*written, *outputs(tracks=tracks)), WITH_LINES), Parts(NullDetector()))
+    again = ("--counts", tmp_path / "again.xlsx", "--page", tmp_path / "again")
+    said = run("count", tracks, "-c", gate, "--strict", *again, code=0).err
+    texts = [text_of(tmp_path / name) for name in (*names, "again.xlsx", "again")]
+    assert ["no vehicle was found, and nothing moved" in text for text in (said, *texts)] == [
+        True
+    ] * 5
+    assert not caplog.text
+
+
 @pytest.mark.parametrize("way", WAYS)
 def test_a_doubt_is_said_at_every_step(
     tmp_path: Path, run: Program, way: str, clean: list[Image], caplog: pytest.LogCaptureFixture
 ) -> None:
     change, words = WAYS[way]
     clip, tracks, gate = (tmp_path / name for name in ("in.mp4", "tracks.jsonl", "gate.yaml"))
-    info = VideoInfo(clip, *SIZE, Fraction(RATE), Fraction(1, RATE), frames=FRAMES)
-    with VideoWriter(clip, info, OutputSettings()) as writer:
-        for index, image in enumerate(clean):
-            shown = np.ascontiguousarray(change(image, index))
-            writer.write(Frame(index, Fraction(index, RATE), Picture(shown)))
+    write_frames(clip, [change(image, index) for index, image in enumerate(clean)])
     gate.write_text(render_settings(SETTINGS))
     files = {".json": "c.json", ".xlsx": "c.xlsx", "page": "page", "review": "review"}
     sinks = zip(("counts", "counts", "page", "review"), files.values(), strict=True)

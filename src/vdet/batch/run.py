@@ -143,12 +143,16 @@ class TotalFile:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The runs to process and those to skip; all their outputs are in `folder`."""
+    """The runs to process and those to skip; all their outputs are in `folder`.
+
+    `doubtful` of those to skip may have wrong results, by their records.
+    """
 
     folder: Path
     runs: tuple[Run, ...]
     skipped: tuple[Run, ...]
     totals: tuple[TotalFile, ...]
+    doubtful: int = 0
 
 
 def make_plan(
@@ -196,14 +200,19 @@ def make_plan(
     _reject_shared(runs, totals, folder)
     videos = (source.path for source in sources)
     inputs = input_files(*videos, *settings_files, settings=settings)
-    manifest, skipped = folder / MANIFEST, []
+    manifest, skipped, doubtful = folder / MANIFEST, list[Run](), 0
     OutputFiles(overwrite=True, inputs=inputs).check(manifest, makes_folder=True)
     if skip_existing:
-        written = outputs_by_path(read_batch(folder))
+        records = list(read_batch(folder))
+        written = outputs_by_path(records)
+        latest = {
+            os.path.realpath(item.path): record for record in records for item in record.outputs
+        }
         all_runs, runs = runs, []
         for run in all_runs:
             if is_up_to_date(run, written):
                 skipped.append(run)
+                doubtful += latest[os.path.realpath(run.outputs[0].path)].is_doubtful
             else:
                 runs.append(allow_replacing(run, written))
     for run in runs:
@@ -212,7 +221,7 @@ def make_plan(
     total_files = OutputFiles(overwrite=replaces_totals, inputs=inputs)
     for total in totals:
         total_files.check(total.path, makes_folder=True)
-    return Plan(folder, tuple(runs), tuple(skipped), totals)
+    return Plan(folder, tuple(runs), tuple(skipped), totals, doubtful)
 
 
 def _run_of(source: InputVideo, folder: Path, common: Run) -> Run:

@@ -243,10 +243,7 @@ def _process_video(run: "Run") -> bool:
     if totals.corrected:
         announce(f"{run.source}: {totals.corrected}")
     findings = findings_in(totals.facts)
-    if findings.nothing_moved:
-        announce(f"{run.source}: no vehicle was found, and nothing moved")
-    else:
-        announce_notes(run.source, findings.items)
+    announce_notes(run.source, findings.items)
     return bool(warnings_in(findings.items))
 
 
@@ -275,7 +272,7 @@ def _process_videos(
     if scheduler:
         workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
     results = run_batch(plan, workers=workers, threads=max(1, cores // jobs))
-    failed, is_doubtful, clocks = 0, False, list[str]()
+    failed, is_doubtful, clocks = 0, plan.doubtful > 0, list[str]()
     with progress_bars(" files") as progress, closing(results):
         advance = progress("", len(plan.runs))
         for run, record in results:
@@ -287,7 +284,8 @@ def _process_videos(
         more = f" (and {quantity(len(clocks) - 1, 'more file')})" if len(clocks) > 1 else ""
         LOG.warning("%s%s", clocks[0], more)
     done, skipped = len(plan.runs) - failed, len(plan.skipped)
-    also = f"{skipped} skipped, " if skipped else ""
+    doubtful = f" ({plan.doubtful} doubtful)" if plan.doubtful else ""
+    also = f"{skipped} skipped{doubtful}, " if skipped else ""
     announce(f"{plan.folder}: {quantity(done, 'file')} done, {also}{failed} failed")
     return failure_code(failed, len(plan.runs) + skipped), is_doubtful
 

@@ -153,11 +153,6 @@ class MotionWatch:
         self._end(self._movers)
         self._movers, self._background = [], np.empty((0, 0), np.float32)
 
-    @property
-    def nothing_moved(self) -> bool:
-        """Whether there was neither a track nor anything else that travelled, after `findings`."""
-        return not (self._tracked or self._missed or self._others)
-
     def findings(self) -> list[Finding]:
         """Return what travelled and was not found: how much of it, and when."""
         self._end(self._movers)
@@ -182,8 +177,10 @@ class MotionWatch:
                 f"{places}, mostly {when(self._spans)}: do not trust a count of 0"
             )
             return [Finding("nothing-found", text, tuple(self._spans), value=float(self._missed))]
-        text = "no vehicle was found; what moved here does not look like one"
-        return [Finding("nothing-found", text, severity="note")] if self._others else []
+        text = "no vehicle was found, and nothing moved"
+        if self._others:
+            text = "no vehicle was found; what moved here does not look like one"
+        return [Finding("nothing-found", text, severity="note")]
 
     def _link(self, time: float, areas: list[_Area], before: Image) -> None:
         """Link the movers; `before` marks the boxes of the previous plane."""

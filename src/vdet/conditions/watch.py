@@ -121,8 +121,7 @@ class Conditions:
         chosen = without(findings, settings.conditions.ignore)
         facts = tuple(item for item in chosen if item.severity == "fact")
         items = tuple(item for item in chosen if item.severity != "fact")
-        is_still = self._camera.is_still
-        return Findings(items, is_still, facts, is_still and self._motion.nothing_moved)
+        return Findings(items, self._camera.is_still, facts)
 
 
 def planes_of(picture: Picture) -> tuple[Image, Image]:

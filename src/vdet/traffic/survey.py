@@ -105,6 +105,7 @@ class Survey:
         doubts = list(dict.fromkeys(text for counts in self.counts for text in counts.warnings))
         if more := len(doubts[_MOST:]):
             doubts[_MOST:] = [f"and {quantity(more, 'other')}, see Notes"]
+        still = set.intersection(*(_nothing_found(counts) for counts in self.counts))
         clocks = dict.fromkeys(counts.clock.source for counts in self.counts if counts.clock)
         times = (time for time in (whole.start, whole.end) if isinstance(time, datetime))
         zones = dict.fromkeys(f"UTC{time.isoformat()[-6:]}" for time in times)
@@ -119,7 +120,7 @@ class Survey:
             "clock": ", ".join(clocks) or "unknown: times are those of the video",
             "interval": self.settings.traffic.interval or "the whole time",
             "checked": self._checked(),
-            "conditions": "; ".join(doubts) or "no doubts",
+            "conditions": "; ".join(doubts or ["no doubts", *still]),
             "heavy share": measures.HEAVY_NAMED if len(self._classes) > 1 else None,
             "program": f"vdet {__version__}",
         }
@@ -312,6 +313,12 @@ class Survey:
         rows += [["", text] for text in _NOTES.splitlines()]
         rows += [["", f"PCU: {', '.join(units)}; all other classes 1."]] if units else []
         return SheetTable(("file", "note"), rows)
+
+
+def _nothing_found(counts: Counts) -> set[str]:
+    """Return the note that no vehicle was found, if the file has it."""
+    codes = {item.text: (item.code, item.severity) for item in counts.findings}
+    return {text for text, code in codes.items() if code == ("nothing-found", "note")}
 
 
 def _time(value: ClockTime) -> Cell:
