@@ -227,7 +227,9 @@ def make_plan(
 def _run_of(source: InputVideo, folder: Path, common: Run) -> Run:
     """Return the run of a video, with its outputs in `folder`."""
     video = folder / source.relative_path
-    outputs = tuple(_named(output, video) for output in common.outputs)
+    endings = (item.path.name or sink_kind(item.sink).endings[0] for item in common.outputs)
+    named = zip(common.outputs, map(video.with_suffix, endings), strict=True)
+    outputs = tuple(replace(output, path=path) for output, path in named)
     return replace(common, source=source.path, outputs=outputs)
 
 
@@ -239,12 +241,6 @@ def _check_outputs(run: Run, inputs: FileIds) -> None:
     except OutputError as error:
         error.field = error.field and "skip_existing"
         raise
-
-
-def _named(output: Output, video: Path) -> Output:
-    """Return an output named after a video; its path was the ending of the name."""
-    ending = output.path.name or sink_kind(output.sink).endings[0]
-    return replace(output, path=video.with_suffix(ending))
 
 
 def _reject_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
