@@ -59,7 +59,7 @@ def text_of(path: Path) -> str:
     """Return the text of an output: of a workbook, that of its summary."""
     if path.suffix == ".xlsx":
         rows = openpyxl.load_workbook(path)["Summary"].values
-        return " ".join(str(cell) for row in rows for cell in row)
+        return " ".join(str(cell) for row in rows for cell in row if cell is not None)
     if path.is_dir():
         [path] = path.glob("*.html")
     return path.read_text()

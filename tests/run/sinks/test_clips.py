@@ -97,18 +97,19 @@ def test_an_exact_clip_has_the_frames_from_the_margin_before_to_the_margin_after
 def test_an_exact_clip_without_margin_has_all_frames_of_its_vehicle(
     source: Path, tmp_path: Path
 ) -> None:
-    shown = results({1: ("car", [20]), 2: ("car", range(30, 34)), 3: ("bus", [COUNT - 1])})
+    last = [COUNT - 2, COUNT - 1]
+    shown = results({1: ("car", [20, 21]), 2: ("car", range(30, 34)), 3: ("bus", last)})
     assert list(cut(source, tmp_path, exact=True, margin=0, shown=shown).values()) == [
-        [20],
+        [20, 21],
         [30, 31, 32, 33],
-        [COUNT - 1],
+        last,
     ]
 
 
 def test_a_clip_that_cannot_be_cut_is_left_out_with_a_warning(
     source: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    beyond = results({1: ("car", [20]), 2: ("bus", [COUNT + 1])}, count=COUNT + 2)
+    beyond = results({1: ("car", [20, 21]), 2: ("bus", range(COUNT, COUNT + 2))}, count=COUNT + 2)
     assert list(cut(source, tmp_path, exact=True, margin=0, shown=beyond)) == [
         "clip-00-00-00-car-1.mp4"
     ]

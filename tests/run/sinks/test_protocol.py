@@ -143,7 +143,7 @@ class TestFailure:
         assert names == {"fragile.txt", "out.csv", "out.mp4", "stages", "page", "crops"}
         assert (tmp_path / "fragile.txt").read_text().split() == [str(n) for n in range(20)]
         assert len(read(tmp_path / "out.mp4")) == 20
-        assert len(list((tmp_path / "stages").iterdir())) == 5
+        assert len(list((tmp_path / "stages").iterdir())) == 6
 
     @pytest.mark.parametrize("moment", ["middle", "end"])
     def test_an_error_of_the_disk_names_the_output_that_it_hit(
