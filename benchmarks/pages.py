@@ -120,6 +120,7 @@ def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
         records=records,
         thumbnails=thumbnails,
         poster=still,
+        still=still,
         player=None,
         settings="",
     )
