@@ -22,7 +22,7 @@ from vdet.config.schema import Settings
 from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_truth
-from vdet.run.result import FrameResult
+from vdet.run.steps import FrameResult
 from vdet.synthetic.render import write_clip, write_truth
 from vdet.synthetic.scene import Scene, SceneVehicle, pole_scene
 from vdet.track.track import Track

@@ -20,8 +20,7 @@ from vdet.boxes import Image
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import LaneSettings, Settings
 from vdet.detect.detectors import load_detector
-from vdet.lanes.curves import LaneCurves
-from vdet.lanes.road import Road, RoadFinder
+from vdet.lanes.road import LaneCurves, Road, RoadFinder
 from vdet.media import Frame, Picture
 from vdet.run.steps import LaneStep, with_positions
 from vdet.synthetic.render import Renderer, must_be_found, true_boxes

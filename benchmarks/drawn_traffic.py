@@ -13,8 +13,7 @@ from vdet.labels.label import SavedTracks
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.frame import Coding
 from vdet.run.loop import Parts, build, peek
-from vdet.run.result import FrameResult
-from vdet.run.steps import Step
+from vdet.run.steps import FrameResult, Step
 from vdet.synthetic.render import STANDS, must_be_found, true_boxes
 from vdet.synthetic.scene import (
     LANE_WIDTH,

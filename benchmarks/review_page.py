@@ -31,9 +31,9 @@ from vdet.pages.render import REVIEW_NAME
 from vdet.review.correcting import apply_corrections
 from vdet.review.corrections import Corrections
 from vdet.review.strips import BandPassage, Passages, bands_of
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
+from vdet.run.steps import FrameResult
 from vdet.synthetic.render import Renderer, TrueBox, draw_vehicle, true_boxes
 from vdet.synthetic.scene import (
     LANE_WIDTH,

@@ -20,7 +20,7 @@ from vdet.config.classes import standard_class
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.detect.onnx.network import Header, Session, read_header
 from vdet.errors import DataError
-from vdet.learn.net.export import export_network, write_model
+from vdet.learn.net.network import export_network, write_model
 
 
 def from_checkpoint(path: Path, output: Path, base: Header | None) -> None:

@@ -27,8 +27,7 @@ from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.onnx.detector import NetworkDetector
 from vdet.detect.onnx.network import Header, ScoreCalibration, Session, read_header
-from vdet.evaluate.output import RunName, figure, table
-from vdet.evaluate.report import video_report
+from vdet.evaluate.report import RunName, figure, table, video_report
 from vdet.evaluate.results import Counting, MeasuredImage, best_f1, evaluate_images, evaluate_video
 from vdet.evaluate.scores import MATCH_IOU, ComparedFrame, RankedPredictions
 from vdet.files import json_text, write_whole

@@ -32,7 +32,7 @@ from vdet.conditions.watch import planes_of
 from vdet.config.loading import load_settings
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.onnx.detector import SHIPPED
-from vdet.evaluate.output import table
+from vdet.evaluate.report import table
 from vdet.files import json_text, write_whole
 from vdet.labels.images import LabelledImage
 from vdet.labels.reading import read_labelled_images

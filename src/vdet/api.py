@@ -44,13 +44,11 @@ from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
 from vdet.review.correcting import apply_corrections
 from vdet.review.corrections import Corrections
-from vdet.run.images import ImageJob, ImageSearch, run_images
-from vdet.run.inputs import input_files
+from vdet.run.images import ImageJob, ImageSearch, input_files, run_images
 from vdet.run.loop import Parts
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkKind, check_sinks
-from vdet.run.steps import Step
+from vdet.run.steps import FrameResult, Step
 from vdet.run.video import Results, Run, RunTotals, run_video
 from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker

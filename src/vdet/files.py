@@ -71,7 +71,7 @@ class OutputFiles:
         Replace existing files, and keep their permissions. A link itself is replaced, not its
         target. Otherwise every existing file is kept, also one that appears during the run.
     inputs
-        The files that the run reads, which are never replaced: see `vdet.run.inputs`.
+        The files that the run reads, which are never replaced: see `vdet.run.images`.
     is_last
         The program writes nothing after these files: a signal to end it that comes while they are
         renamed, or later, is ignored. Without it, such a signal waits until they are renamed. A

@@ -20,17 +20,17 @@ COMMANDS = "vdet.commands"
 
 _BUILT_IN: dict[str, dict[str, str]] = {
     COMMANDS: {
-        "calibrate": "vdet.cli.calibrate:calibrate",
+        "calibrate": "vdet.cli.camera:calibrate",
         "config": "vdet.cli.info:config",
         "count": "vdet.cli.count:count",
-        "demo": "vdet.cli.demo:demo",
-        "detect-image": "vdet.cli.detect_image:detect_image",
-        "detect-video": "vdet.cli.detect_video:detect_video",
-        "draw": "vdet.cli.draw:draw",
+        "demo": "vdet.cli.info:demo",
+        "detect-image": "vdet.cli.detect:detect_image",
+        "detect-video": "vdet.cli.detect:detect_video",
+        "draw": "vdet.cli.camera:draw",
         "eval": "vdet.cli.evaluate:eval_group",
         "info": "vdet.cli.info:info",
         "mine": "vdet.cli.train:mine",
-        "review": "vdet.cli.review:review",
+        "review": "vdet.cli.count:review",
         "train": "vdet.cli.train:train",
         "train-net": "vdet.cli.train:train_net",
     },

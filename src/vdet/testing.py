@@ -16,8 +16,8 @@ from vdet.config.schema import Settings
 from vdet.detect.detectors import DetectorModel
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import SinkContext, SinkKind
+from vdet.run.steps import FrameResult, findings_in
 from vdet.track.track import Track, VideoTracker
 from vdet.traffic.live import LiveTraffic
 

@@ -9,8 +9,7 @@ import pytest
 
 from clips import write_clip
 from running import write_drive
-from vdet.batch.run import Plan, find_sources, make_plan
-from vdet.batch.task import ManifestRecord, Written, open_manifest
+from vdet.batch import ManifestRecord, Plan, Written, find_sources, make_plan, open_manifest
 from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import Output, data
 from vdet.run.sinks.protocol import BatchTotal, output_state
@@ -23,8 +22,8 @@ TRACKS: dict[str, str | None] = {"tracks": ".csv"}
 
 @pytest.fixture(autouse=True)
 def simple_digest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vdet.batch.task.result_digest", digest)
-    monkeypatch.setattr("vdet.batch.run.load_detector", lambda _: None)
+    monkeypatch.setattr("vdet.batch.result_digest", digest)
+    monkeypatch.setattr("vdet.batch.load_detector", lambda _: None)
 
 
 def digest(run: Run) -> str:

@@ -17,14 +17,16 @@ from joblib.parallel import SequentialBackend
 
 from red_cars import HEIGHT, WIDTH, red_settings
 from running import names, write_drive
-from vdet.batch.run import Plan, make_plan, run_batch
-from vdet.batch.task import (
+from vdet.batch import (
     ManifestRecord,
+    Plan,
     Written,
+    make_plan,
     open_manifest,
     process_file,
     read_batch,
     result_digest,
+    run_batch,
 )
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.errors import BatchError, OutputError
@@ -75,7 +77,7 @@ def test_the_detector_is_loaded_once_for_all_files(
         loaded.append(arguments)
         return load_detector(*arguments)
 
-    monkeypatch.setattr("vdet.batch.task.load_detector", load)
+    monkeypatch.setattr("vdet.batch.load_detector", load)
     again = replace(job, overwrite=True, outputs=job.outputs[1:])
     for frames in (2, 3):
         assert process_file(replace(again, frames=frames), folder=tmp_path).error is None
@@ -96,7 +98,7 @@ def test_warnings_are_recorded(
         log.info("%s: nothing to worry about", job.source)
         return write_outputs(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("vdet.batch.task.write_outputs", warn_and_process)
+    monkeypatch.setattr("vdet.batch.write_outputs", warn_and_process)
     before = list(logging.getLogger("vdet").handlers)
     assert process_file(job, folder=tmp_path / "out").warnings == (
         f"{job.source}: 3 frames damaged",

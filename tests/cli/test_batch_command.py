@@ -98,7 +98,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
 def test_with_strict_a_failed_file_decides_the_exit_code_before_a_doubtful_one(
     run: Run, clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vdet.batch.task.ManifestRecord.is_doubtful", True)
+    monkeypatch.setattr("vdet.batch.ManifestRecord.is_doubtful", True)
     arguments = ("detect-video", clips / "a.mp4", "--no-video", "--tracks", ".csv", "--strict")
     assert run(*arguments, "-d", tmp_path / "doubtful").code == 4
     again = run(*arguments, "-d", tmp_path / "doubtful", "--skip-existing", code=4)

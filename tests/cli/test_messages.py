@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from conftest import Run
 from running import write_drive
-from vdet.cli.messages import LOG, is_quiet, progress_bars
+from vdet.cli.command import LOG, is_quiet, progress_bars
 
 
 class Terminal(io.StringIO):
@@ -29,7 +29,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
             super().__init__(file=terminal, mininterval=0, **options)
 
     monkeypatch.setattr("tqdm.tqdm", Bar)
-    monkeypatch.setattr("vdet.cli.messages._shows_bars", lambda: not is_quiet())
+    monkeypatch.setattr("vdet.cli.command._shows_bars", lambda: not is_quiet())
     return terminal
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import vdet
 from conftest import Run
-from vdet.cli.messages import print_lines
+from vdet.cli.command import print_lines
 
 
 def test_the_version_is_that_of_the_last_release_in_the_changelog(run: Run) -> None:

@@ -17,7 +17,7 @@ from vdet.media import Frame, Picture
 from vdet.run.loop import Pipeline
 from vdet.track.factory import ShotTracker, timed
 from vdet.track.track import Track
-from vdet.traffic.linking import link_tracks
+from vdet.traffic.crossings import link_tracks
 
 SHOT = shot(1, 40)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Box, Boxes
-from vdet.conditions.weak import WeakWatch
+from vdet.conditions.motion import WeakWatch
 from vdet.media import Picture
 from vdet.track.track import Track
 

@@ -10,12 +10,13 @@ from labels.saving import Row, checked_video, row
 from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
 from vdet.boxes import Box, Boxes
-from vdet.evaluate.output import RunName, table
 from vdet.evaluate.report import (
     DETECTED,
     TRUE,
+    RunName,
     images_report,
     mistake_tiles,
+    table,
     tracks_report,
     video_report,
     worst_tiles,

@@ -14,7 +14,7 @@ from faults.conftest import Start
 from labels.writers import Boxed, Labelled, write_yolo
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_model, red_settings
 from running import frames_of, names, until, write_drive
-from vdet.batch.task import process_file
+from vdet.batch import process_file
 from vdet.errors import VdetError
 from vdet.labels.reading import read_labelled_images
 from vdet.progress import Progress

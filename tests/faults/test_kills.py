@@ -65,7 +65,7 @@ def test_when_a_worker_is_killed_its_file_is_done_again(
 
 KILLS_ITS_PROCESS = """
 import os, signal
-from vdet.batch import task
+from vdet import batch as task
 
 process = task.write_outputs
 

@@ -12,11 +12,11 @@ from conftest import Run
 from faults.conftest import Start
 from red_cars import red_settings
 from running import names, write_drive
-from vdet.batch.task import process_file
+from vdet.batch import process_file
 from vdet.run import video
 from vdet.run.sinks import Output
 from vdet.track.motion.tracker import MotionTracker
-from vdet.track.rules.tracker import RulesTracker
+from vdet.track.rules import RulesTracker
 
 LIMIT = 5_000  # bytes: the short clip is smaller, the others are not
 CAP_DAC_OVERRIDE = 1

@@ -11,8 +11,7 @@ import pytest
 from lanes.chessboards import CAMERA, PATTERN, photographs
 from vdet.config.scene import LensSettings
 from vdet.errors import ImageError
-from vdet.lanes.calibration import calibrate, find_corners
-from vdet.lanes.camera import Undistorter
+from vdet.lanes.camera import Undistorter, calibrate, find_corners
 from vdet.media.images import read_image
 from writing import write_image
 

@@ -12,8 +12,7 @@ from lanes import chessboards
 from lanes.roads import make_road, settings_for
 from vdet.boxes import Box
 from vdet.lanes.camera import TopView, Undistorter
-from vdet.lanes.curves import LaneCurves
-from vdet.lanes.road import Road, RoadFinder, RoadPosition, position_on_road
+from vdet.lanes.road import LaneCurves, Road, RoadFinder, RoadPosition, position_on_road
 from vdet.media import Picture
 from vdet.run.steps import with_positions
 from vdet.synthetic.render import Renderer

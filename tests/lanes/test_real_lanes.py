@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vdet.config.loading import find_config, load_settings
-from vdet.lanes.calibration import LensCalibration, calibrate
+from vdet.lanes.camera import LensCalibration, calibrate
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.media.images import read_image

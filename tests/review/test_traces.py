@@ -20,7 +20,7 @@ from vdet.media import Picture
 from vdet.review.strips import Band, Passages
 from vdet.review.traces import TraceSearch
 from vdet.run.loop import Parts
-from vdet.run.result import findings_in
+from vdet.run.steps import findings_in
 from vdet.run.video import Run, run_video
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counts import Trace

@@ -18,9 +18,9 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Parts, build, peek
-from vdet.run.result import FINDINGS, FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
+from vdet.run.steps import FINDINGS, FrameResult
 from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock

@@ -14,9 +14,9 @@ from running import names
 from vdet.errors import ImageError, OutputError
 from vdet.files import OutputFiles
 from vdet.run.images import ImageJob, ImageSearch, find_images, plan_images, run_images
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, SinkKind
+from vdet.run.steps import FrameResult
 from writing import write_image
 
 

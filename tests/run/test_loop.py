@@ -29,7 +29,7 @@ from vdet.media import Frame
 from vdet.media.frame import Planes
 from vdet.run import video
 from vdet.run.loop import FIRST_FRAMES, Parts
-from vdet.run.result import FrameResult
+from vdet.run.steps import FrameResult
 from vdet.run.threads import SearchThreads
 from vdet.run.video import Run, run_video
 
@@ -135,7 +135,7 @@ class TestRun:
             return SearchThreads(count)
 
         monkeypatch.setattr("vdet.run.video.core_count", lambda: 3)
-        monkeypatch.setattr("vdet.run.search.SearchThreads", note)
+        monkeypatch.setattr("vdet.run.loop.SearchThreads", note)
         job = video.Run(write_drive(tmp_path / "a.mp4", 2))
         run_video(replace(job, settings=SETTINGS), Parts(red_model()))
         run_video(replace(job, threads=2, settings=SETTINGS), Parts(red_model()))

@@ -9,7 +9,7 @@ import pytest
 from boxing import moved_to, rounded
 from red_cars import CAR, PERSPECTIVE, SETTINGS, WIDTH, drive, road
 from run.red_runs import follow, model_for, outputs, run_red
-from vdet.batch.task import result_digest
+from vdet.batch import result_digest
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError

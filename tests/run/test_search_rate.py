@@ -18,10 +18,9 @@ from vdet.detect.onnx.detector import NetworkDetector
 from vdet.detect.onnx.network import InputForm, Recognized
 from vdet.errors import ModelError, OutputError
 from vdet.media import Frame, Picture
-from vdet.run.loop import Pipeline
-from vdet.run.result import FrameResult
-from vdet.run.search import SearchRate
+from vdet.run.loop import Pipeline, SearchRate
 from vdet.run.sinks import Output
+from vdet.run.steps import FrameResult
 from vdet.track.motion.tracker import MotionTracker
 
 IMAGE = Picture(road(CAR))

@@ -10,8 +10,7 @@ from boxing import moved_to
 from vdet.boxes import NO_BOXES, Box
 from vdet.conditions.watch import Conditions
 from vdet.media import Frame, Picture
-from vdet.run.result import FrameResult
-from vdet.run.steps import StandingStep
+from vdet.run.steps import FrameResult, StandingStep
 from vdet.track.track import Track
 
 FRAMES, WIDTH = 10, 320

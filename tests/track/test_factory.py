@@ -8,7 +8,7 @@ from vdet.config.schema import Settings
 from vdet.media import Picture
 from vdet.track.factory import InterpolatingTracker, make_tracker
 from vdet.track.motion.tracker import MotionTracker
-from vdet.track.rules.tracker import RulesTracker
+from vdet.track.rules import RulesTracker
 from vdet.track.track import Track
 
 

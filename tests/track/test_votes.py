@@ -15,7 +15,7 @@ from vdet.labels.formats import TrackWriter, last_classes, track_formats
 from vdet.labels.label import SourceVideo
 from vdet.media import Picture
 from vdet.track.motion.tracker import MotionTracker
-from vdet.track.rules.tracker import RulesTracker
+from vdet.track.rules import RulesTracker
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.records import VehicleRecords
 

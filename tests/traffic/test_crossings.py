@@ -19,8 +19,14 @@ from traffic.scenes import (
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.crossings import Border, Line, crossings, lines_and_zones
-from vdet.traffic.linking import VehiclePath, link_tracks
+from vdet.traffic.crossings import (
+    Border,
+    Line,
+    VehiclePath,
+    crossings,
+    lines_and_zones,
+    link_tracks,
+)
 
 SETTINGS = settings_for(LINE, ZONE)
 DOWN = through((0, 600, 250), (5, 600, 550))  # in the zone at 0.83 s, on the line at 2.5 s

@@ -22,7 +22,7 @@ from traffic.scenes import (
 from vdet.config.scene import LineSettings
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks
-from vdet.traffic.linking import link_tracks
+from vdet.traffic.crossings import link_tracks
 
 DOWN = through((0, 600, 300), (4, 600, 500))
 

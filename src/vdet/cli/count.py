@@ -1,16 +1,23 @@
-"""`vdet count`: count the vehicles of track files at lines and in zones."""
+"""Counts of saved tracks, and the page on which they are checked.
+
+`vdet count`: count the vehicles of track files at lines and in zones.
+
+`vdet review`: the strips of lines, from a video and its saved tracks, and what was checked.
+"""
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from vdet.cli import options
-from vdet.cli.command import command
-from vdet.cli.messages import LOG, announce, announce_notes, print_lines, progress_bars
+from vdet.cli.command import LOG, announce, announce_notes, command, print_lines, progress_bars
 from vdet.config.classes import STANDARD_CLASSES, standard_classes
 from vdet.errors import DOUBTFUL, quantity
 from vdet.files import OutputFiles, output_errors, write_text
+from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
     from vdet.boxes import Image
@@ -68,7 +75,7 @@ def count(
       vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min
       vdet count day/*.jsonl -c gate.yaml --counts day.xlsx --page day
     """
-    from vdet.batch.task import MANIFEST
+    from vdet.batch import MANIFEST
 
     if len(tracks) > 1:  # by a pattern such as found/*.jsonl
         tracks = tuple(path for path in tracks if path.name != MANIFEST)
@@ -120,9 +127,8 @@ def count(
 
 def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image | None") -> None:
     """Write a table, a workbook or a page; `scene` is the picture of the settings."""
-    from vdet.pages.counts import counts_page
     from vdet.pages.render import PAGE_NAME
-    from vdet.pages.traffic import scene_picture
+    from vdet.pages.traffic import counts_page, scene_picture
     from vdet.traffic.output import counts_content, flows_content, is_workbook
     from vdet.traffic.tables import write_content
     from vdet.traffic.workbook import write_workbook
@@ -142,7 +148,7 @@ def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of all files, and of each file if one has no clock."""
-    from vdet.evaluate.output import table
+    from vdet.evaluate.report import table
     from vdet.traffic.counts import direction_totals
 
     totals = {}
@@ -172,7 +178,7 @@ def _estimated(estimate: "Estimate | None") -> str:
 
 def _matrix(videos: "Sequence[Counts]") -> list[str]:
     """Return the flows between lines and zones over all files; empty if there is only one."""
-    from vdet.evaluate.output import table
+    from vdet.evaluate.report import table
     from vdet.traffic.output import flow_matrix
 
     matrix = flow_matrix(videos)
@@ -180,3 +186,53 @@ def _matrix(videos: "Sequence[Counts]") -> list[str]:
         return []
     rows = [(name, *map(str, row.values())) for name, row in matrix.items()]
     return ["", *table(("from", *(f"to {name}" for name in matrix), "to none"), rows)]
+
+
+@command()
+@click.argument("source_path", type=options.PATH, metavar="IN")
+@options.tracks_from_option(required=True)
+@options.output_folder("-o", "--output", required=True, help="Folder for the page, review.html.")
+@options.corrections_option
+@options.start_option
+@options.end_option
+@options.settings_options()
+@options.overwrite_option
+def review(
+    source_path: Path,
+    output: Path,
+    corrections: options.Paths,
+    tracks: Path,
+    start: Fraction | None,
+    end: Fraction | None,
+    source: options.SettingsSource,
+    overwrite: bool,
+) -> None:
+    """Write a page for checking the counts of a video.
+
+    IN is a video, read again but not searched. The page has a strip of each line, which shows
+    everything that crossed it, with a mark for each counted vehicle. It saves corrections, and
+    opens those of --corrections.
+
+    \b
+    Example:
+      vdet review in.mp4 --tracks-from tracks.jsonl -c gate.yaml -o review
+    """
+    from vdet.run.video import Run, run_video
+
+    source.check_for_tracks()
+    settings = source.load()
+    if not settings.traffic:
+        raise click.UsageError("no lines or zones to review; add a settings file with -c FILE")
+    run = Run(
+        source_path,
+        outputs=(Output("review", output),),
+        settings=settings,
+        start=start,
+        end=end,
+        overwrite=overwrite,
+        settings_files=(*source.files, tracks),
+        corrections=corrections,
+    )
+    with progress_bars(" frames") as progress:
+        run_video(run, tracks=tracks, progress=progress, is_last=True)
+    print_lines(f"{output}: written")

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 import click
 
 from vdet.cli import options
-from vdet.cli.command import command
-from vdet.cli.messages import progress_bars
+from vdet.cli.command import command, progress_bars
 from vdet.cli.options import ResultFiles, SettingsSource, facts_options, results_options
 from vdet.workers import core_count
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
-    from vdet.evaluate.output import RunName
+    from vdet.evaluate.report import RunName
 
 
 @command()
@@ -147,7 +146,7 @@ def counts(events: Path, truth: Path, results: ResultFiles) -> None:
     """
     from vdet.evaluate.counts import count_lines, score_counts
     from vdet.review.corrections import Corrections
-    from vdet.run.inputs import input_files
+    from vdet.run.images import input_files
 
     results.check(input_files(events, truth))
     scores = score_counts(events, Corrections.read(truth))
@@ -157,7 +156,7 @@ def counts(events: Path, truth: Path, results: ResultFiles) -> None:
 def _run_name(settings: "Settings", source: SettingsSource) -> "RunName":
     """Return a description of the detector that is measured."""
     from vdet.detect.detectors import model_file
-    from vdet.evaluate.output import RunName
+    from vdet.evaluate.report import RunName
 
     detector, configs = settings.detector, " ".join(source.configs) or None
     return RunName(detector.kind, model_file(detector), configs, source.changes)

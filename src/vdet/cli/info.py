@@ -1,19 +1,32 @@
-"""`vdet info` describes models, cameras and this machine; `vdet config` prints settings."""
+"""What is installed, which settings there are, and a demo.
+
+`vdet info` describes models, cameras and this machine; `vdet config` prints settings.
+
+`vdet demo`: the whole program on synthetic roads.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.cli.command import command
-from vdet.cli.messages import print_lines
-from vdet.cli.options import PATH, ResultFiles, SettingsSource, facts_options, settings_options
+from vdet.cli.command import announce, command, print_lines, progress_bars
+from vdet.cli.options import (
+    PATH,
+    ResultFiles,
+    SettingsSource,
+    facts_options,
+    number_option,
+    overwrite_option,
+    settings_options,
+)
 from vdet.errors import ModelError, printable, quantity
 from vdet.version import __version__
 from vdet.workers import core_count
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
+
 
 Facts = dict[str, Any]
 """Values for JSON by name; each is also a line of text."""
@@ -153,3 +166,33 @@ def config(source: SettingsSource) -> None:
     from vdet.config.rendering import render_settings
 
     print_lines(*render_settings(source.load()).splitlines())
+
+
+@command()
+@click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
+@number_option("--seed", type=click.IntRange(min=0), default=5, help="Seed of the random scenes.")
+@overwrite_option
+def demo(folder: Path, seed: int, overwrite: bool) -> None:
+    """Try the whole program on synthetic roads.
+
+    Draws two roads with vehicles, from a moving camera and from a pole. The network finds the
+    vehicles, and counts those seen from the pole. Then a linear model, trained on patches of other
+    synthetic roads, finds them too. All results are compared with the ground truth, and written
+    into DIR, by default demo.
+
+    \b
+    Examples:
+      vdet demo folder --seed 2 --overwrite
+    """
+    from vdet.demo import run_demo
+
+    with progress_bars("") as progress:
+        lines = run_demo(
+            folder, seed=seed, overwrite=overwrite, announce=announce, progress=progress
+        )
+    print_lines(
+        *lines,
+        "",
+        f"All files are in {folder}: found.mp4 and page/page.html are worth a look.",
+        "Next, try your own video:  vdet detect-video in.mp4",
+    )

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import click
 
-from vdet.cli.command import Program, verbosity_options
-from vdet.cli.messages import print_lines, set_up_logs
+from vdet.cli.command import Program, print_lines, set_up_logs, verbosity_options
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, escaped, in_one_line
 from vdet.version import __version__
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.cli.messages import print_lines
+from vdet.cli.command import print_lines
 from vdet.errors import ConfigError
 from vdet.files import FileIds, OutputFiles, json_text, output_errors, print_now, write_text
 from vdet.run.sinks import Output
@@ -191,11 +191,11 @@ class SettingsSource:
         return tuple(find_config(name) for name in self.configs)
 
     def inputs(self, *paths: Path, settings: "Settings | None" = None) -> FileIds:
-        """Identify the files that a command reads: see `vdet.run.inputs`.
+        """Identify the files that a command reads: see `vdet.run.images`.
 
         These are `paths`, the settings files, and the model file and masks of `settings`.
         """
-        from vdet.run.inputs import input_files
+        from vdet.run.images import input_files
 
         return input_files(*paths, *self.files, settings=settings)
 

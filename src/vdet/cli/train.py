@@ -7,8 +7,7 @@ from statistics import fmean
 import click
 
 from vdet.cli import options
-from vdet.cli.command import command
-from vdet.cli.messages import LOG, print_lines, progress_bar, progress_bars
+from vdet.cli.command import LOG, command, print_lines, progress_bar, progress_bars
 from vdet.cli.options import Paths, SettingsSource
 from vdet.errors import needing, quantity
 from vdet.files import OutputFiles

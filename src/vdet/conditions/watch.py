@@ -9,8 +9,7 @@ import numpy as np
 from vdet.boxes import Box, Boxes, Image
 from vdet.conditions import visibility
 from vdet.conditions.camera import CameraWatch
-from vdet.conditions.motion import MotionWatch
-from vdet.conditions.weak import WeakWatch
+from vdet.conditions.motion import MotionWatch, WeakWatch
 from vdet.config.schema import Settings
 from vdet.detect.onnx.water import is_wet
 from vdet.errors import clock_text

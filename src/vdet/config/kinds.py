@@ -421,7 +421,7 @@ SVM = DetectorKind(
     tracker={"look_ahead": 0.8},
 )
 MOTION = TrackerKind(MotionTrackerSettings, _imported("vdet.track.motion.tracker:MotionTracker"))
-RULES = TrackerKind(RulesTrackerSettings, _imported("vdet.track.rules.tracker:make_rules_tracker"))
+RULES = TrackerKind(RulesTrackerSettings, _imported("vdet.track.rules:make_rules_tracker"))
 
 
 def default_kind(section: str) -> str:

@@ -21,8 +21,7 @@ from vdet.pages.traffic import DrawnMark, traffic_marks, with_marks
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import Counts
-from vdet.traffic.crossings import lines_and_zones
-from vdet.traffic.linking import VehiclePath, link_tracks
+from vdet.traffic.crossings import VehiclePath, lines_and_zones, link_tracks
 from vdet.traffic.measures import APPROACHES
 
 _SECTIONS = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}

@@ -1,4 +1,9 @@
-"""Vehicles in single images: read the image, detect, pass the result to the sinks."""
+"""Single images: the files that a command reads, and the search of images.
+
+The files that a command reads, which none of its outputs may replace.
+
+Vehicles in single images: read the image, detect, pass the result to the sinks.
+"""
 
 import logging
 import os
@@ -12,16 +17,40 @@ from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
 from vdet.detect.detectors import DetectorModel, stage_images_of, warnings_of
 from vdet.errors import ImageError
-from vdet.files import OutputFiles, is_hidden
+from vdet.files import FileIds, OutputFiles, file_ids, is_hidden
 from vdet.media import Frame, Picture
-from vdet.media.images import IMAGE_SUFFIXES, is_image_name, read_image
+from vdet.media.images import IMAGE_SUFFIXES, is_image_name, numbered_images, read_image
+from vdet.regions import check_masks
 from vdet.run.loop import named_errors
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
-from vdet.run.steps import ParallelStep, StepContext, make_steps
+from vdet.run.steps import FrameResult, ParallelStep, StepContext, make_steps
 from vdet.run.threads import SearchThreads
 from vdet.track.track import Track
+
+_DATA_SUFFIXES = IMAGE_SUFFIXES | {".csv", ".json", ".txt", ".yaml", ".yml"}
+
+
+def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
+    """Identify the files at `paths`, and the model file, masks and picture of the settings.
+
+    A folder stands for the images and labels in it, recursively, and a pattern such as
+    `img_%04d.png` for its images. Raises `VideoError` if there is none of these, `ImageError` or
+    `ConfigError` if a mask cannot be used.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            files += (file for file in path.rglob("*") if file.suffix.lower() in _DATA_SUFFIXES)
+        else:
+            files += numbered_images(path) or [path]
+    if settings:
+        check_masks(settings.regions)
+        masks = (region.mask for region in settings.regions)
+        named = [settings.detector.model, settings.survey.picture, *masks]
+        files += map(Path, filter(None, named))
+    return file_ids(files)
+
 
 _log = logging.getLogger("vdet")
 

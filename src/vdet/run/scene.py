@@ -12,7 +12,7 @@ from vdet.media import Frame
 from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress
-from vdet.run.result import findings_in
+from vdet.run.steps import findings_in
 from vdet.run.video import Results, Run, SceneTracks, log, saved_tracks
 from vdet.track.track import FrameTracks
 

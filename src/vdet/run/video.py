@@ -20,11 +20,11 @@ from vdet.media import Frame, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
-from vdet.run.inputs import input_files
+from vdet.run.images import input_files
 from vdet.run.loop import Parts, build, named_errors, peek, with_later_classes
-from vdet.run.result import FINDINGS, Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
+from vdet.run.steps import FINDINGS, Fact, Facts, FrameResult, findings_in
 from vdet.run.threads import read_async
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, check_intervals, find_clock

@@ -13,15 +13,17 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
 from vdet.traffic.counts import Counts, Direction, Event
 from vdet.traffic.crossings import (
+    MAX_GAP,
     VANISH,
     Border,
     Crossing,
     Line,
+    TrackLinker,
+    VehiclePath,
     crossings,
     lines_and_zones,
     lines_near,
 )
-from vdet.traffic.linking import MAX_GAP, TrackLinker, VehiclePath
 
 _MAX_AGE = 0.2
 """Seconds after which running counts are recomputed."""

@@ -16,7 +16,7 @@ from vdet.media.images import coarse_scale, shrunk
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
-from vdet.traffic.linking import path_moves
+from vdet.traffic.crossings import path_moves
 from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, plain_time, write_content
 
@@ -58,7 +58,7 @@ class VehicleRecord:
     best_score, sum_of_scores
         Over these frames, 0 to 1.
     class_name
-        The class in its last frame: see `vdet.track.votes`.
+        The class in its last frame: see `vdet.track.track`.
     path
         Ground points (`Track.foot`): the first, one after each step of `PATH_STEP`, and the last.
         Predicted ones are omitted, unless all are.

@@ -13,9 +13,9 @@ from vdet.learn.net.augmentation import (
     SampleDrawer,
     repeat_factors,
     with_signs,
+    with_weather,
 )
 from vdet.learn.net.sources import MAX_PIXELS, NetSample, NetSource
-from vdet.learn.net.weather import with_weather
 
 PLAIN = ImageDrawing(width=256, height=128, magnified=1.0, mosaics=0.0)
 MOSAIC = ImageDrawing(width=256, height=128, magnified=1.0, mosaics=1.0)

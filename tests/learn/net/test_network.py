@@ -19,16 +19,17 @@ from vdet.detect.onnx.network import (  # noqa: E402
     cell_centers,
 )
 from vdet.errors import DataError  # noqa: E402
-from vdet.learn.net.export import export_network, start_from  # noqa: E402
-from vdet.learn.net.network import (  # noqa: E402
+from vdet.learn.net.network import (  # noqa: E402  # noqa: E402
     Network,
     Vehicles,
     assign,
     class_weights,
     decode,
+    export_network,
     flatten,
     giou,
     paired_iou,
+    start_from,
     uncounted,
 )
 from vdet.learn.net.sources import UNLABELLED, NetSample, NetSource  # noqa: E402

@@ -17,8 +17,10 @@ from vdet.detect.onnx.network import (  # noqa: E402
     ScoreCalibration,
     Session,
 )
-from vdet.learn.net.export import export_network  # noqa: E402
-from vdet.learn.net.network import Network  # noqa: E402
+from vdet.learn.net.network import (  # noqa: E402
+    Network,
+    export_network,
+)
 
 OLD, NEW = ("car", "truck"), ("car", "truck", "other vehicle")
 STEEP = ScoreCalibration(slope=2.0, offset=0.5)

@@ -23,9 +23,9 @@ from vdet.errors import OutputError
 from vdet.files import OutputFiles
 from vdet.media.demux import Demuxer
 from vdet.media.reader import VideoReader
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import check_sinks
+from vdet.run.steps import FrameResult
 from vdet.track.track import Track
 
 RATE = Fraction(25)

@@ -17,8 +17,8 @@ from vdet.draw.boxes import color_of, draw_box
 from vdet.lanes.road import Lane, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
 from vdet.media.frame import Coding, Planes
-from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import Overlay
+from vdet.run.steps import FrameResult
 from vdet.track.track import Track
 
 LENS = LensSettings(

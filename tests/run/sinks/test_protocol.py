@@ -15,9 +15,9 @@ from vdet.boxes import Image
 from vdet.errors import OutputError
 from vdet.files import OutputFiles
 from vdet.findings import Findings
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind, check_sinks, open_sinks
+from vdet.run.steps import FrameResult
 from vdet.run.video import Run
 
 MOMENTS = ("open", "enter", "first", "middle", "end")

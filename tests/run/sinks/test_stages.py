@@ -15,8 +15,8 @@ from vdet.boxes import Box, Boxes, Image
 from vdet.errors import OutputError
 from vdet.lanes.road import Lane, Road
 from vdet.media.images import read_image
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
+from vdet.run.steps import FrameResult
 
 NAMES = [
     *("1-windows.png", "2-features.png", "3-hits.png", "4-heat.png", "5-threshold.png"),

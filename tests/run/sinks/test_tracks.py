@@ -19,8 +19,8 @@ from vdet.findings import Finding, Findings
 from vdet.labels.reading import read_tracks
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
+from vdet.run.steps import FrameResult
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock
 

@@ -11,8 +11,8 @@ from run.red_runs import COUNT, outputs, result_of, run_red, write
 from running import names, rows_of
 from vdet.boxes import Box
 from vdet.media.images import read_image
-from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
+from vdet.run.steps import FrameResult
 from vdet.run.video import Run
 
 

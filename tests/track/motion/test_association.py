@@ -6,8 +6,7 @@ import pytest
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.track.motion.association import take_over_ids, without_duplicates
-from vdet.track.motion.state import whole_box
-from vdet.track.motion.vehicle import FrameStep, Observation, TrackedVehicle
+from vdet.track.motion.vehicle import FrameStep, Observation, TrackedVehicle, whole_box
 
 SIZE = (1000, 500)
 BOX = np.array([400.0, 200.0, 500.0, 260.0])

@@ -13,7 +13,7 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.draw.boxes import Color
 from vdet.media import Picture
 from vdet.media.frame import Coding, Planes
-from vdet.track.motion.pairing import appearances, differences
+from vdet.track.motion.association import appearances, differences
 from vdet.track.motion.tracker import MotionTracker
 
 RED, WHITE, SILVER, GREY, BLUE = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vdet.track.motion.state import MotionState
+from vdet.track.motion.vehicle import MotionState
 
 
 @pytest.mark.parametrize("seconds", [-0.4, -0.1, 0.1, 0.4])

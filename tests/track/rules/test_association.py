@@ -6,8 +6,7 @@ from boxing import moved_to
 from seed import SEED_TRACKER
 from textured_road import textured_road
 from vdet.boxes import Box, Image
-from vdet.track.rules.car import Car, Region
-from vdet.track.rules.tracker import RulesTracker
+from vdet.track.rules import Car, Region, RulesTracker
 
 LEFT, RIGHT = Box.sized(100, 200, 100, 80), Box.sized(320, 200, 100, 80)
 

@@ -4,7 +4,7 @@ import pytest
 from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
 from vdet.boxes import Box, Image
-from vdet.track.rules.car import Car, Region
+from vdet.track.rules import Car, Region
 
 BOX = Box.sized(100, 60, 80, 60)
 FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)

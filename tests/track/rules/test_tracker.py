@@ -9,8 +9,7 @@ from textured_road import textured_road
 from track.rules.scenes import detections
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.media import Picture
-from vdet.track.rules.car import Region
-from vdet.track.rules.tracker import RulesTracker, large_enough
+from vdet.track.rules import Region, RulesTracker, large_enough
 from vdet.track.track import Track
 
 SEDAN, VAN = Box.sized(100, 200, 100, 80), Box.sized(400, 200, 120, 100)

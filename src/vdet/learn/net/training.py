@@ -16,8 +16,15 @@ from vdet.detect.onnx.network import Header, Session, read_header
 from vdet.errors import DataError
 from vdet.files import staged
 from vdet.learn.net.augmentation import ImageDrawing, SampleDrawer
-from vdet.learn.net.export import export_network, start_from
-from vdet.learn.net.network import Batch, Network, Vehicles, class_weights, loss_of
+from vdet.learn.net.network import (
+    Batch,
+    Network,
+    Vehicles,
+    class_weights,
+    export_network,
+    loss_of,
+    start_from,
+)
 from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.run.threads import SearchThreads
 from vdet.version import __version__

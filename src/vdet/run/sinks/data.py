@@ -25,8 +25,8 @@ from vdet.labels.images import LabelledImage
 from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.pages.traffic import scene_picture, survey_image
-from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.run.steps import FrameResult, findings_in
 from vdet.traffic import output
 from vdet.traffic.live import source_video
 from vdet.traffic.records import join_records, records_content

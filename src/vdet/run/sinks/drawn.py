@@ -13,8 +13,8 @@ from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import IMAGE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
-from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkKind
+from vdet.run.steps import FrameResult
 from vdet.run.threads import write_async
 from vdet.track.track import Track
 from vdet.workers import core_count

@@ -22,9 +22,9 @@ from vdet.pages.batch import write_index, write_reviews
 from vdet.pages.render import PAGE_NAME, REVIEW_NAME, link_to, thumbnail, webp_uri
 from vdet.pages.video import Player, VideoPage, longest
 from vdet.regions import Regions
-from vdet.run.result import FINDINGS, FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.run.steps import FINDINGS, FrameResult, findings_in
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock, Span, extend
 from vdet.traffic.live import LiveTraffic

@@ -9,10 +9,17 @@ import numpy as np
 from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, clipped
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
-from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
-from vdet.track.motion.pairing import appearances, buffered_iou, differences, pair
-from vdet.track.motion.state import Position, whole_box
-from vdet.track.motion.vehicle import FrameStep, Observation, TrackedVehicle
+from vdet.track.motion.association import (
+    appearances,
+    are_hidden,
+    are_parts,
+    buffered_iou,
+    differences,
+    pair,
+    take_over_ids,
+    without_duplicates,
+)
+from vdet.track.motion.vehicle import FrameStep, Observation, Position, TrackedVehicle, whole_box
 from vdet.track.track import Track
 
 FIRST_STEP = 0.04

@@ -1,4 +1,9 @@
-"""`vdet detect-video`: find and follow vehicles in one video, or in many."""
+"""Vehicles in images and in videos.
+
+`vdet detect-image`: find vehicles in images.
+
+`vdet detect-video`: find and follow vehicles in one video, or in many.
+"""
 
 import re
 import shlex
@@ -11,16 +16,97 @@ from typing import TYPE_CHECKING
 import click
 
 from vdet.cli import options
-from vdet.cli.command import command
-from vdet.cli.messages import LOG, announce, announce_notes, progress_bars
-from vdet.errors import DOUBTFUL, OutputError, failure_code, quantity
-from vdet.files import file_ids
+from vdet.cli.command import LOG, announce, announce_notes, command, print_lines, progress_bars
+from vdet.errors import DOUBTFUL, ImageError, OutputError, failure_code, quantity
+from vdet.files import OutputFiles, file_ids
 from vdet.run.sinks import Output
 from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 if TYPE_CHECKING:
-    from vdet.batch.task import ManifestRecord
+    from vdet.batch import ManifestRecord
+    from vdet.run.steps import FrameResult
     from vdet.run.video import Run
+
+
+@command()
+@click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
+@options.output_file(
+    "-o",
+    "--output",
+    metavar="PATH",
+    help="Write the image with its boxes. For several images, a folder, in which they keep their "
+    "names and folders.",
+)
+@options.output_folder("--stages", help="Write an image of every stage into DIR.")
+@options.output_files("--json", help="Write the boxes to FILE. With -, to standard output.")
+@options.output_files(
+    "--labels", help="Write the boxes for labelling tools: .coco.json. Can be repeated."
+)
+@options.sinks_option
+@options.classes_option
+@options.lanes_option
+@options.model_option
+@options.settings_options(classes="classes", lanes="lanes.enabled", model="detector.model")
+@options.overwrite_option
+def detect_image(
+    images: options.Paths,
+    output: Path | None,
+    stages: Path | None,
+    sinks: tuple[Output, ...],
+    source: options.SettingsSource,
+    overwrite: bool,
+    **paths: options.Paths,
+) -> int:
+    """Find vehicles in images.
+
+    Each IMAGE is a file, or a folder (searched recursively). Without an output option, prints the
+    vehicles: class, score, and box in pixels as x, y, width and height.
+
+    \b
+    Examples:
+      vdet detect-image road.jpg -o found.jpg --json -
+      vdet detect-image images/ -o found/ --labels images.coco.json
+      vdet detect-image road.jpg --stages stages
+    """
+    settings = source.load()
+    if settings.lack_of_metres:
+        announce(f"vdet: note: {settings.lack_of_metres}")
+    from vdet.detect.detectors import load_detector
+    from vdet.run.images import ImageSearch, find_images, plan_images, run_images
+    from vdet.run.sinks.protocol import STANDARD_OUTPUT, check_sinks
+
+    search = ImageSearch(load_detector(settings.detector), settings)
+    paths_below = find_images(images)
+    outputs = options.requested_outputs(sinks, paths)
+    inputs = source.inputs(*paths_below, settings=settings)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs, is_last=True)
+    check_sinks(outputs, files)
+    jobs = plan_images(paths_below, output, stages, files)
+    is_printed = not (output or stages or outputs)
+    failed = 0
+    results = run_images(jobs, outputs, search, files, threads=core_count())
+    with progress_bars(" images") as progress, closing(results):
+        advance = progress("", len(jobs))
+        for result in results:
+            if isinstance(result, ImageError):
+                LOG.error("%s", result)
+                failed += 1
+            elif is_printed:
+                _print_vehicles(result)
+            advance(1)
+    if failed < len(jobs):
+        written = (output, stages, *(item.path for item in outputs if item.path != STANDARD_OUTPUT))
+        announce(*(f"{path}: written" for path in written if path))
+    return failure_code(failed, len(jobs))
+
+
+def _print_vehicles(result: "FrameResult") -> None:
+    rows = []
+    for track in result.tracks:
+        box = ", ".join(map(str, track.box.xywh))
+        rows.append(f"  {track.class_name or 'vehicle':8} {track.score:.2f}  {box}")
+    print_lines(f"{result.source}: {quantity(len(rows), 'vehicle')}", *rows)
+
 
 STAGE_MARGIN = Fraction(2)
 """Seconds to process before and after `--at`, for detector and tracker."""
@@ -217,7 +303,7 @@ def _drawn_video(paths: Sequence[Path], *, is_only: bool) -> Path:
 
 def _beside(source: Path) -> Path:
     """Return the name of the video that is written without any output option."""
-    from vdet.batch.run import DRAWN
+    from vdet.batch import DRAWN
     from vdet.run.sinks.protocol import sink_kind
 
     return source.with_name(f"{source.stem}{DRAWN}{sink_kind('video').endings[0]}")
@@ -226,8 +312,8 @@ def _beside(source: Path) -> Path:
 def _process_video(run: "Run") -> bool:
     """Process a video, and return whether the result is doubtful."""
     from vdet.findings import warnings_in
-    from vdet.run.result import findings_in
     from vdet.run.sinks.protocol import STANDARD_OUTPUT
+    from vdet.run.steps import findings_in
     from vdet.run.video import run_video
 
     with progress_bars(" frames") as progress:
@@ -261,7 +347,7 @@ def _process_videos(
     -------
     The exit code, and whether a result is doubtful.
     """
-    from vdet.batch.run import make_plan, run_batch
+    from vdet.batch import make_plan, run_batch
 
     if scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
