@@ -44,15 +44,21 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     assert [name.partition(".crops/")[0] for name in crops] == [NASTY, "day/a"]
     assert set(found) - set(crops) == {
         *("all.cars.csv", "index.html", "manifest.jsonl"),
-        *(f"{NASTY}{end}" for end in (".cars.csv", ".mp4", ".page/page.html")),
-        *(f"day/a{end}" for end in (".cars.csv", ".mp4", ".page/page.html")),
+        *(
+            f"{NASTY}{end}"
+            for end in (".cars.csv", ".mp4", ".page/page.html", ".page/vehicle-1.webp")
+        ),
+        *(
+            f"day/a{end}"
+            for end in (".cars.csv", ".mp4", ".page/page.html", ".page/vehicle-1.webp")
+        ),
     }
     assert [row["video"] for row in rows_of(Path("found/all.cars.csv"))] == [NASTY, "day/a"]
     for page in Path("found").rglob("*.html"):
         addresses = addresses_in(page)
         assert addresses
         if page.name == "index.html":
-            assert sum(".crops/" in address for address in addresses) == len(crops)
+            assert sum(address.endswith(".webp") for address in addresses) == len(crops)
         for address in addresses:
             assert (page.parent / unquote(address.partition("#")[0])).is_file(), address
 

@@ -57,7 +57,7 @@ NETWORKS: Mapping[str, tuple[Write, str]] = {
     "a single number": (constant(0.0), "has an unknown form"),
     "no numbers": (constant(np.full((1, 84, CELLS), np.nan)), "not finite"),
     "endless numbers": (constant(np.full((1, 84, CELLS), np.inf)), "not finite"),
-    "large numbers": (constant(np.full((1, 300, 6), 3e38)), ""),
+    "large numbers": (constant(np.full((1, 300, 6), 3e38)), "not finite"),
 }
 
 

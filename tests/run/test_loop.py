@@ -85,7 +85,7 @@ class TestFollowFrames:
                 np.testing.assert_array_equal(
                     getattr(first.detections, name), getattr(second.detections, name)
                 )
-            heat, same = (item.detections.trace.heat.values for item in (first, second))
+            heat, same = (item.detections.trace[1].values for item in (first, second))
             np.testing.assert_array_equal(heat, same)
 
 

@@ -24,7 +24,8 @@ def write_all(folder: Path) -> Path:
     path = folder / "found" / "all.parquet"
     path.parent.mkdir()
     truck = track(1, BOX, class_name="truck", lane=0, distance=18.4)
-    parts = {"a": [frame(0, truck), frame(1, truck, track(2, BOX))], "b": [frame(0, track(1, BOX))]}
+    others = [frame(at, truck, track(2, BOX)) for at in (1, 2, 3)]
+    parts = {"a": [frame(0, truck), *others], "b": [frame(at, track(1, BOX)) for at in (0, 1, 2)]}
     content = {
         name: records_content(summarize(frames, WIDTH), path) for name, frames in parts.items()
     }
@@ -64,7 +65,7 @@ def test_the_questions_of_the_page_on_batches_are_answered(
     names: dict[str, Any] = {}
     for block in blocks("batch.md"):
         exec(block, names)
-    assert names["ahead"] == [("a", 0.0, 0.04, 18.4)]
+    assert names["ahead"] == [("a", 0.0, 0.12, 18.4)]
     assert names["by_hour"] == [(None, "truck", 1, None), (None, None, 2, None)]
 
 

@@ -55,9 +55,9 @@ class TestJoined:
     NAMES = ("a", "day/b", 'with ", and\nnewline')
 
     def join(self, folder: Path, suffix: str) -> str:
-        bus = frame(26, track(2, Box.sized(5, 5, 30, 30), class_name="bus"))
+        bus = [frame(at, track(2, BOX, class_name="bus")) for at in (26, 27, 28)]
         path = folder / f"all{suffix}"
-        content = records_content(summarize([*passing(26), bus], WIDTH), path)
+        content = records_content(summarize([*passing(26), *bus], WIDTH), path)
         join_records(dict.fromkeys(self.NAMES, content), path)
         return path.read_text(encoding="utf-8")
 
