@@ -42,8 +42,8 @@ _ENOUGH, _LATEST = 2, 100
 """Minimum number of tracked vehicles that crossed, and number of the latest ones in use."""
 _SHADED, _EVEN = 0.8, 0.08
 """Minimum fraction of a shadow that is darker by one factor in all channels, and the maximum
-standard deviation of this factor. On drawn cameras 68 of 72 missed vehicles have a trace with them,
-and 71 without; the traces of a real clip, which were lower edges of tracked lorries, are gone.
+standard deviation of this factor. On thirty drawn cameras 439 of 480 missed vehicles have a trace
+with them, and 455 without; the traces of a real clip, lower edges of tracked lorries, are gone.
 """
 _GREY = 128
 """Blue and red of grey, levels."""
