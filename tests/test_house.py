@@ -9,6 +9,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -161,6 +163,14 @@ def test_finding_vehicles_imports_few_modules(clip_path: Path, tmp_path: Path) -
     """A module costs about half a millisecond at every start."""
     start = f"main(['detect-video', '-q', {str(clip_path)!r}, {str(tmp_path / 'out.mp4')!r}])"
     assert 400 < len(modules_of(start)) < 600
+
+
+def test_an_image_needs_no_traffic(tmp_path: Path) -> None:
+    image, out = tmp_path / "road.png", tmp_path / "out.png"
+    cv2.imwrite(str(image), np.full((360, 640, 3), 90, np.uint8))
+    modules = modules_of(f"main(['detect-image', '-q', {str(image)!r}, '-o', {str(out)!r}])")
+    assert out.exists()
+    assert [name for name in modules if name.startswith("vdet.traffic")] == []
 
 
 def test_no_two_classes_share_a_name() -> None:

@@ -1,8 +1,6 @@
 """Commands with `-q` and `-v`, the program, and the lines that it prints.
 
-Messages: lines, log records and progress bars that do not garble one another.
-
-Commands with `-q` and `-v`, and the program, which other packages extend.
+Lines, log records and progress bars do not garble one another. Other packages extend the program.
 """
 
 import logging

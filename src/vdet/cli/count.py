@@ -21,7 +21,6 @@ from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
     from vdet.boxes import Image
-    from vdet.run.sinks import Output
     from vdet.traffic.counts import Counts, Estimate
     from vdet.traffic.survey import Survey
 

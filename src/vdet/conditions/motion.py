@@ -1,11 +1,10 @@
 """What moved and was not detected: before a fixed camera, and before a moving one.
 
-Moving objects in front of a fixed camera that are not detected vehicles.
-
-The background is a running median of the planes (McFarlane and Schofield 1995). Areas that differ
-from it, outside the boxes, are linked from plane to plane. Only objects that travel count, not
-leaves, flags or water on the lens. They count as vehicles if they are compact, not upright as
-people are, and have sharp edges, unlike rain, clouds and reflections.
+Before a fixed camera, these are moving objects that are not detected vehicles. The background is a
+running median of the planes (McFarlane and Schofield 1995). Areas that differ from it, outside the
+boxes, are linked from plane to plane. Only objects that travel count, not leaves, flags or water on
+the lens. They count as vehicles if they are compact, not upright as people are, and have sharp
+edges, unlike rain, clouds and reflections.
 
 Weak detections that stay in view of a moving camera: possibly a vehicle ahead.
 

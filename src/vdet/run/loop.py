@@ -1,7 +1,5 @@
 """One video: the search of its frames, and the loop from frames to results.
 
-The search of a video: which frames are searched, and when, in threads.
-
 Where nothing moves, fewer frames are searched, if the detector is stateless. The search of a
 segment has two phases: first its last frame, the key frame, then the frames between two key frames,
 if these differ.

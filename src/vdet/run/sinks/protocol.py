@@ -1,9 +1,4 @@
-"""The protocol of outputs (sinks), and what they share.
-
-The frame that pages and workbooks show: the one with the most vehicles.
-
-The protocol of outputs (sinks), their kinds, and how outputs are checked and opened.
-"""
+"""The protocol of outputs (sinks), their kinds, and how outputs are checked and opened."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -14,63 +9,21 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
-import cv2
-import numpy as np
-
-from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.detect.detectors import StageImages
 from vdet.errors import OutputError
 from vdet.files import OutputFiles, output_errors
 from vdet.media import VideoInfo
-from vdet.media.images import coarse_scale, shrunk
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.sinks import Output
 from vdet.run.steps import Fact, FrameResult
-from vdet.traffic.records import VehicleRecord
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # an image needs no traffic: a tenth of the time of `detect-image`
     from vdet.review.corrections import Corrections
+    from vdet.run.sinks.poster import Poster
     from vdet.traffic.live import LiveTraffic
     from vdet.traffic.records import BestCrops
     from vdet.traffic.survey import Survey
-
-
-class Poster:
-    """Keeps the frame with the most vehicles; `is_coarse` is `output.coarse`."""
-
-    def __init__(self, *, is_coarse: bool) -> None:
-        self._is_coarse = is_coarse
-        self._best: FrameResult | None = None
-
-    def add(self, result: FrameResult) -> None:
-        """Add a frame."""
-        if self._best is None or len(result.tracks) > len(self._best.tracks):
-            self._best = result
-
-    def image(self, vehicles: Iterable[VehicleRecord]) -> Image | None:
-        """Return the frame, BGR uint8, at its own size; None without frames.
-
-        `vehicles` are all of the video: no detail is kept that would show their plates.
-        """
-        if self._best is None:
-            return None
-        image, boxes = self._best.frame.image, [vehicle.largest for vehicle in vehicles]
-        if not self._is_coarse:
-            return image
-        height, width = image.shape[:2]
-        largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
-        reduced = shrunk(image, coarse_scale(largest, height))
-        return np.asarray(cv2.resize(reduced, (width, height)), np.uint8)  # marks are drawn on it
-
-    def with_boxes(self, image: Image | None) -> Image | None:
-        """Return a copy of the frame, as `image` returns it, with a box around each vehicle."""
-        if self._best is None or image is None:
-            return None
-        drawn = image.copy()
-        self._best.draw_tracks(drawn, ())
-        return drawn
-
 
 STANDARD_OUTPUT = Path("-")
 
@@ -148,7 +101,7 @@ class SinkContext:
     @cached_property
     def poster(self) -> "Poster":
         """The frame with the most vehicles; sinks that use it add each result."""
-        from vdet.run.sinks.protocol import Poster
+        from vdet.run.sinks.poster import Poster
 
         return Poster(is_coarse=self.settings.output.coarse)
 
