@@ -1,30 +1,26 @@
-"""The figures of vdet in docs/comparison.md: counts, clips and the start of the program.
+"""Crossings counted on drawn roads, as in docs/comparison.md: `python -m benchmarks.comparison`.
 
-    python -m benchmarks.comparison
-
-With `pip install supervision trackers`, the rows of LineZone and ByteTrack are measured too. The
-page has the commands of the other programs. F1 on held-out cameras is not measured here.
+With `pip install supervision trackers`, the rows of LineZone and ByteTrack are measured too.
 """
 
 import tempfile
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 import vdet
-from benchmarks.rounds import seconds_of
+from benchmarks.drawn_traffic import true_labels
 from vdet.config.kinds import NetworkSettings
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import SavedTracks
-from vdet.labels.reading import read_truth
 from vdet.run.steps import FrameResult
-from vdet.synthetic.render import write_clip, write_truth
-from vdet.synthetic.scene import Scene, SceneVehicle, pole_scene
+from vdet.synthetic.render import write_clip
+from vdet.synthetic.scene import Scene, pole_scene
 from vdet.track.track import Track
 
 SEEDS = (1, 2, 3, 4)
@@ -33,7 +29,6 @@ LINES = (
     LineSettings(name="south", start=(0.02, 0.8), end=(0.98, 0.8), left="in", right="out"),
 )
 EVERY_FRAME = Settings(detector=NetworkSettings(stride=1), traffic=TrafficSettings(lines=LINES))
-START = "import vdet; vdet.Detector()"
 
 Row = tuple[int, Scores | None]
 """Crossings that were counted, and the scores of the tracks."""
@@ -41,10 +36,10 @@ Row = tuple[int, Scores | None]
 
 def rows_of_road(seed: int, folder: Path) -> Iterator[tuple[str, Row]]:
     """Yield the name and the figures of each way to count on a road."""
-    scene, clip, truth = pole_scene(seed), folder / f"{seed}.mp4", folder / f"{seed}.txt"
+    scene, clip = pole_scene(seed), folder / f"{seed}.mp4"
     write_clip(clip, scene)
-    write_truth(truth, scene)
-    true, followed = read_truth(truth), vdet.follow(clip, settings=EVERY_FRAME)
+    true = true_labels(scene, range(scene.frames))
+    followed = vdet.follow(clip, settings=EVERY_FRAME)
     results = list(followed)
     shown = [result.frame_tracks.boxes for result in results]
     assert followed.counts is not None
@@ -106,39 +101,21 @@ def _labels(frames: Sequence[vdet.Boxes]) -> SavedTracks:
     )
 
 
-def pause_scene() -> Scene:
-    """Return 80 s of a road with vehicles from second 20 and from second 50 on."""
-
-    def later(seed: int, seconds: float, number: int) -> Iterator[SceneVehicle]:
-        for vehicle in pole_scene(seed).vehicles:
-            path = tuple(replace(point, time=point.time + seconds) for point in vehicle.path)
-            yield replace(vehicle, id=vehicle.id + number, path=path)
-
-    vehicles = (*later(1, 20, 0), *later(2, 50, 8))
-    return replace(pole_scene(1), vehicles=vehicles, frames=1000)
-
-
 def main() -> None:
+    """Print a row for each way to count."""
+    rows: dict[str, list[Row]] = defaultdict(list)
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        rows: dict[str, list[Row]] = {}
         for seed in SEEDS:
-            for way, row in rows_of_road(seed, folder):
-                rows.setdefault(way, []).append(row)
-        for way, found in rows.items():
-            scores = [some for _, some in found if some]
-            text = f"{way:<26}{sum(count for count, _ in found):>3} crossings"
-            if scores:
-                means = (fmean(getattr(some, key) for some in scores) for key in ("f1", "idf1"))
-                text += "   F1 {:.3f}   IDF1 {:.3f}".format(*means)
-                text += f"   {sum(some.id_switches for some in scores)} id switches"
-            print(text, flush=True)
-        clip, clips = folder / "pause.mp4", folder / "clips"
-        write_clip(clip, pause_scene())
-        command = ("-m", "vdet", "-q", "detect-video", str(clip), "--no-video", "--clips")
-        print(f"clips: {seconds_of(*command, str(clips)):.1f} s of processor time,", end=" ")
-        print(*sorted(path.name for path in clips.iterdir()))
-    print(f"start: {seconds_of('-c', START):.1f} s of processor time")
+            for way, row in rows_of_road(seed, Path(name)):
+                rows[way].append(row)
+    for way, found in rows.items():
+        scores = [some for _, some in found if some]
+        text = f"{way:<26}{sum(count for count, _ in found):>3} crossings"
+        if scores:
+            means = (fmean(getattr(some, key) for some in scores) for key in ("f1", "idf1"))
+            text += "   F1 {:.3f}   IDF1 {:.3f}".format(*means)
+            text += f"   {sum(some.id_switches for some in scores)} id switches"
+        print(text)
 
 
 if __name__ == "__main__":

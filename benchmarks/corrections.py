@@ -76,12 +76,9 @@ def reviewed(true: Event | None, counted: Event | None) -> dict[str, Any]:
     event = counted or true
     assert event
     text = {"line": event.name, "time": round(event.time, 2), "direction": event.direction}
-    text |= {"class": event.class_name}
-    if counted is None:
-        return text | {"error": "missed"}
-    text["id"] = counted.id
-    if true is None:
-        return text | {"error": "false"}
+    text |= {"class": event.class_name} | ({"id": counted.id} if counted else {})
+    if true is None or counted is None:
+        return text | {"error": "missed" if counted is None else "false"}
     if true.class_name != counted.class_name:
         return text | {"error": "class", "correct": true.class_name}
     return text

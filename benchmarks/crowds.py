@@ -60,29 +60,18 @@ def crowd(number: int) -> Scene:
             end = ahead + speed * _SECONDS
             if near or (lane == place and number % 2 == 0 and min(ahead, end) < 8):
                 continue  # it would drive into the camera
-            change = rng.normal(0, 0.06) * reach
-            way = _way(rng, ahead, change, speed, lateral, is_oncoming=is_oncoming)
+            # It changes its speed a little half-way.
+            half, heading = _SECONDS / 2, math.pi if is_oncoming else 0.0
+            middle = ahead + speed * half + rng.normal(0, 0.06) * reach
+            way = tuple(
+                Waypoint(time, place, lateral + rng.normal(0, 0.15), heading)
+                for time, place in ((0, ahead), (half, middle), (2 * half, middle + speed * half))
+            )
             vehicles.append(SceneVehicle(len(vehicles) + 1, way, random_paint(rng), body))
     rate = Fraction(25)
     return replace(
         scene, vehicles=tuple(vehicles), speed=own, rate=rate, frames=int(_SECONDS * rate)
     )
-
-
-def _way(
-    rng: np.random.Generator,
-    ahead: float,
-    change: float,
-    speed: float,
-    lateral: float,
-    *,
-    is_oncoming: bool,
-) -> tuple[Waypoint, ...]:
-    """Return the waypoints of a vehicle that changes its speed a little half-way."""
-    heading = math.pi if is_oncoming else 0.0
-    middle = ahead + speed * _SECONDS / 2 + change
-    ways = ((0.0, ahead), (_SECONDS / 2, middle), (float(_SECONDS), middle + speed * _SECONDS / 2))
-    return tuple(Waypoint(t, z, lateral + rng.normal(0, 0.15), heading) for t, z in ways)
 
 
 def scores_of(scene: Scene, model: DetectorModel, settings: Settings) -> Scores:

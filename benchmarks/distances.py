@@ -1,17 +1,15 @@
 """Errors of the distance and the lane of vehicles, on drawn roads where their places are known.
 
-Each step has one more source of error: `truth` has the true lines and the true boxes, `lane` the
-lines that are found in the drawn frames, `tracks` also the boxes that the detector and the tracker
-show (in a third of the scenes). `guess` is `lane` without a calibrated camera: the focal length is
-from an angle of view that is 4° off, the lane is taken as 3.5 m wide though it is 3.7 m, and the
-four points of a frame are read 2 pixels off (a few scenes).
+`lane` has the true boxes, and the lines that are found in the drawn frames; `tracks` the boxes that
+the detector and the tracker show (in a third of the scenes). `guess` is `lane` without a calibrated
+camera: the focal length is from an angle of view that is 4° off, the lane is taken as 3.5 m wide
+though it is 3.7 m, and the four points of a frame are read 2 pixels off (a few scenes).
 """
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from itertools import pairwise, product
+from itertools import chain, islice, pairwise, product
 
 import numpy as np
 
@@ -20,7 +18,8 @@ from vdet.boxes import Image
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import LaneSettings, Settings
 from vdet.detect.detectors import load_detector
-from vdet.lanes.road import LaneCurves, Road, RoadFinder
+from vdet.evaluate.report import table
+from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Frame, Picture
 from vdet.run.steps import LaneStep, with_positions
 from vdet.synthetic.render import Renderer, must_be_found, true_boxes
@@ -56,10 +55,11 @@ MIN_IOU = 0.5
 
 @dataclass(frozen=True)
 class Drive:
-    """A scene, and whether its camera pitches."""
+    """A scene, whether its camera pitches, and a guess of what the camera sees of the road."""
 
     scene: Scene
     pitches: bool = False
+    guess: LaneSettings | None = None
 
     def at(self, index: int) -> Scene:
         """Return the scene as the camera sees it in a frame."""
@@ -78,37 +78,23 @@ class Drive:
         """Return the lane finder, set to the road from 6 m, or the nearest seen, to 42 m."""
         camera = self.scene.camera
         nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
-        view = lane_view(camera, near=max(6.0, nearest), far=42.0)
+        view = self.guess or lane_view(camera, near=max(6.0, nearest), far=42.0)
         return RoadFinder(None, view, camera.width, camera.height)
 
 
-@dataclass(frozen=True)
-class GuessedDrive(Drive):
-    """A scene whose camera is only guessed: see `guess` above.
+def guessed_view(camera: PinholeCamera, angle: float, seed: int) -> LaneSettings:
+    """Return settings of the lane finder as a user would guess them: see `guess` above.
 
     `angle` is the error of the angle of view, degrees; `seed` is that of the points.
     """
-
-    angle: float = 0.0
-    seed: int = 0
-
-    def finder(self) -> RoadFinder:
-        """Return the lane finder, set as a user would from one frame."""
-        camera = self.scene.camera
-        true_view = lane_view(camera, near=7.0, far=42.0)
-        rng = np.random.default_rng(self.seed)
-        points = np.array(true_view.points) * (camera.width, camera.height)
-        points[:, 0] += rng.choice([-READ_ERROR, READ_ERROR], 4)
-        half_angle = np.arctan(camera.width / 2 / camera.focal) + np.radians(self.angle) / 2
-        focal = camera.width / 2 / np.tan(half_angle)
-        near, far = points[1, 0] - points[0, 0], points[2, 0] - points[3, 0]
-        view = LaneSettings.model_validate(
-            {
-                "points": (points / (camera.width, camera.height)).tolist(),
-                "metres": (GUESSED_WIDTH, focal * GUESSED_WIDTH * (1 / far - 1 / near)),
-            }
-        )
-        return RoadFinder(None, view, camera.width, camera.height)
+    size = np.array((camera.width, camera.height))
+    points = np.array(lane_view(camera, near=7.0, far=42.0).points) * size
+    points[:, 0] += np.random.default_rng(seed).choice([-READ_ERROR, READ_ERROR], 4)
+    half_angle = np.arctan(camera.width / 2 / camera.focal) + np.radians(angle) / 2
+    focal = camera.width / 2 / np.tan(half_angle)
+    near, far = points[1, 0] - points[0, 0], points[2, 0] - points[3, 0]
+    metres = GUESSED_WIDTH, focal * GUESSED_WIDTH * (1 / far - 1 / near)
+    return LaneSettings.model_validate({"points": (points / size).tolist(), "metres": metres})
 
 
 @dataclass(frozen=True)
@@ -125,32 +111,21 @@ class Sample:
         return self.reported.distance / self.truth.distance - 1
 
 
-Step = Callable[[Drive], Iterator[Sample]]
-
-
 def main() -> None:
     """Run the steps, and print a table of each."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.distances", description=__doc__)
-    parser.add_argument("steps", nargs="*", help="truth, lane, tracks (default: all), or guess")
-    parser.add_argument(
-        "-c", "--config", default="default", help="settings of the detector: default, svm, seed"
-    )
+    parser.add_argument("steps", nargs="*", help="lane, tracks (default: both), or guess")
+    parser.add_argument("-c", "--config", default="default", help="of the detector: svm, seed")
     options = parser.parse_args()
     settings = load_settings([find_config(options.config)])
-    steps: dict[str, Step] = {"truth": true_lines, "lane": found_lines, "tracks": Shown(settings)}
-    if options.steps == ["guess"]:
-        for angle in (-4.0, 0.0, 4.0):
-            guessed = [drive for seed in range(4) for drive in guesses(angle, seed)]
-            print_table(
-                f"{angle:+.0f}°", [sample for drive in guessed for sample in found_lines(drive)]
-            )
-        return
-    for name in options.steps or steps:
-        every = 3 if name == "tracks" else 1
-        by_drive = [[*steps[name](drive)] for drive in [*drives()][::every]]
-        print_table(name, [sample for samples in by_drive for sample in samples])
-        worst = min(_right(samples) for samples in by_drive)
-        print(f"worst of {len(by_drive)} scenes, to {FARTHEST} m: {worst:.1%} within {RIGHT:.0%}\n")
+    for step in options.steps or ("lane", "tracks"):
+        if step == "lane":
+            print_table(step, chain.from_iterable(map(found_lines, drives())))
+        elif step == "tracks":
+            print_table(step, shown_boxes(islice(drives(), 0, None, 3), settings))
+        else:
+            for angle in (-4.0, 0.0, 4.0):
+                print_table(f"{angle:+.0f}°", chain.from_iterable(map(found_lines, guesses(angle))))
 
 
 def drives() -> Iterator[Drive]:
@@ -161,10 +136,11 @@ def drives() -> Iterator[Drive]:
         yield Drive(scene_of(CAMERAS[number], radius, 101 + number), pitches=True)
 
 
-def guesses(angle: float, seed: int) -> Iterator[GuessedDrive]:
+def guesses(angle: float) -> Iterator[Drive]:
     """Give scenes of the dashboard camera on a straight road and in a bend."""
-    for number, radius in enumerate((np.inf, 800.0)):
-        yield GuessedDrive(scene_of(CAMERAS[0], radius, number + 2 * seed), False, angle, seed)
+    for seed, (number, radius) in product(range(4), enumerate((np.inf, 800.0))):
+        scene = scene_of(CAMERAS[0], radius, number + 2 * seed)
+        yield Drive(scene, guess=guessed_view(scene.camera, angle, seed))
 
 
 def scene_of(camera: PinholeCamera, radius: float, seed: int) -> Scene:
@@ -183,19 +159,6 @@ def moving(vehicle: SceneVehicle, *, off: bool) -> SceneVehicle:
     ends = (6 + 0.6 * abs(lateral), 26.0) if near else (27 + abs(lateral), 55.0)
     start, end = ends if off else reversed(ends)
     return replace(vehicle, path=(Waypoint(0, start, lateral), Waypoint(last, end, lateral)))
-
-
-def true_lines(drive: Drive) -> Iterator[Sample]:
-    """Place the true boxes by the true lines."""
-    camera = drive.scene.camera
-    finder = drive.finder()
-    black = np.zeros((camera.height, camera.width, 3), np.uint8)
-    bare = finder.update(finder.observe(Picture(black)))
-    for index in COUNTED:
-        scene = drive.at(index)
-        pitch = (scene.camera.horizon - camera.horizon) / (camera.focal * camera.above_ground)
-        curves = LaneCurves(camera.curvature / 2, 0, -1.85, 1.85, pitch)
-        yield from by_true_boxes(scene, index, replace(bare, curves=curves))
 
 
 def found_lines(drive: Drive) -> Iterator[Sample]:
@@ -218,20 +181,13 @@ def by_true_boxes(scene: Scene, index: int, road: Road) -> Iterator[Sample]:
             yield Sample(places[true_box.id], track)
 
 
-class Shown:
+def shown_boxes(drives: Iterable[Drive], settings: Settings) -> Iterator[Sample]:
     """Place the boxes that a detector and a tracker show, by the lines that are found."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self.model = load_detector(settings.detector)
-
-    def __call__(self, drive: Drive) -> Iterator[Sample]:
-        """Give the shown vehicles that must be found."""
-        rate, lanes = drive.scene.rate, LaneStep(drive.finder(), self.settings.detector.tyre_height)
-        clip = (
-            Frame(i, Fraction(i) / rate, Picture(image)) for i, image in enumerate(drive.images())
-        )
-        for result in follow(self.model, self.settings, drive.scene, clip, lanes):
+    model = load_detector(settings.detector)
+    for drive in drives:
+        rate, lanes = drive.scene.rate, LaneStep(drive.finder(), settings.detector.tyre_height)
+        clip = (Frame(n, n / rate, Picture(image)) for n, image in enumerate(drive.images()))
+        for result in follow(model, settings, drive.scene, clip, lanes):
             index = result.frame.index
             if index in COUNTED:
                 yield from _matched(drive.at(index), index, result.tracks)
@@ -247,27 +203,21 @@ def _matched(scene: Scene, index: int, tracks: Sequence[Track]) -> Iterator[Samp
             yield Sample(places[best.id], track)
 
 
-def _right(samples: Sequence[Sample]) -> float:
-    known = [s for s in samples if s.reported.distance is not None and s.truth.distance <= FARTHEST]
-    return float(np.mean([abs(sample.error) <= RIGHT for sample in known])) if known else 1.0
-
-
-def print_table(name: str, samples: Sequence[Sample]) -> None:
+def print_table(name: str, samples: Iterable[Sample]) -> None:
     """Print a row for each range of the distance, and one for all up to `FARTHEST`."""
-    print(f"| {name}: metres | boxes | none | mean | median | 95 % | within 10 % | lane right |")
-    print("|---|---|---|---|---|---|---|---|")
+    rows, every = [], list(samples)
     for low, high in (*pairwise(EDGES), (0, FARTHEST)):
-        inside = [sample for sample in samples if low < sample.truth.distance <= high]
+        inside = [sample for sample in every if low < sample.truth.distance <= high]
         known = [sample for sample in inside if sample.reported.distance is not None]
         if known:
             errors = np.array([sample.error for sample in known])
             lanes = np.mean([sample.reported.lane == sample.truth.lane for sample in known])
-            print(
-                f"| {low}–{high} | {len(inside)} | {1 - len(known) / len(inside):.0%} | "
-                f"{errors.mean():+.1%} | {np.median(abs(errors)):.1%} | "
-                f"{np.quantile(abs(errors), 0.95):.1%} | {(abs(errors) <= RIGHT).mean():.1%} | "
-                f"{lanes:.1%} |"
-            )
+            row = f"{low}–{high}", str(len(inside)), f"{1 - len(known) / len(inside):.0%}"
+            quantile, near = np.quantile(abs(errors), 0.95), (abs(errors) <= RIGHT).mean()
+            shares = f"{errors.mean():+.1%}", f"{quantile:.1%}", f"{near:.1%}", f"{lanes:.1%}"
+            rows.append((*row, *shares))
+    headings = f"{name}: metres", "boxes", "none", "mean", "95 %", "within 10 %", "lane right"
+    print("\n".join(table(headings, rows)))
 
 
 if __name__ == "__main__":

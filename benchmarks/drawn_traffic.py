@@ -96,6 +96,15 @@ def shown_labels(results: Iterable[FrameResult]) -> SavedTracks:
     return SavedTracks({result.frame.index: result.tracks for result in results if result.tracks})
 
 
+def true_tracks(scene: Scene, index: int, *, min_width: float = 0.0) -> tuple[Track, ...]:
+    """Return the true boxes of a frame as tracks, without those narrower than this, in pixels."""
+    return tuple(
+        Track(item.id, item.box, 0.9, "detected", "car")
+        for item in true_boxes(scene, index)
+        if item.box.width >= min_width
+    )
+
+
 def true_labels(scene: Scene, indices: Iterable[int]) -> SavedTracks:
     """Return the true boxes of frames; vehicles that do not count are ignore regions."""
     height = scene.camera.height

@@ -1,36 +1,23 @@
-"""Pages of many vehicles: how long they take to make, and to open and filter in Chromium.
+"""The index of a batch with 100,000 vehicles of 10,000 videos: `python -m benchmarks.pages`.
 
-    python -m benchmarks.pages
-
-The index of a batch has 100,000 vehicles of 10,000 videos; the page of a video has 1,200 vehicles
-with speeds, and flows. Times are from the start of the navigation: to the first rows, laid out, and
-to the end of the page.
+Times are those to make it, and in Chromium from the start of the navigation: to the first rows,
+laid out, and to the end of the page.
 """
 
 import json
 import re
-import shutil
 import subprocess
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Mapping
-from fractions import Fraction
 from html import unescape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.pole_cameras import HEIGHT, WIDTH
-from vdet.boxes import Box
-from vdet.media import VideoInfo
 from vdet.pages.batch import write_index
 from vdet.pages.render import jpeg_uri
-from vdet.pages.video import VideoPage, longest
-from vdet.track.track import State
-from vdet.traffic.records import VehicleRecord
-from vdet.traffic.speeds import Speeds
 
 CLASSES = ("car", "car", "car", "truck", "bus", "motorcycle")
 FILTERS = {"class": "2", "video": "clip012", "seconds-min": "5", "from": "2026-05-04T10:00"}
@@ -54,8 +41,6 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
     rng = np.random.default_rng(1)
     still, written = jpeg_uri(STILL), dict[str, dict[str, object]]()
     for number in range(videos):
-        unknown = dict.fromkeys(("distance", "lane"))
-        empty = dict.fromkeys(("motion", "side", "size", "picture", "clip"), "")
         rows = [
             {
                 "id": n + 1,
@@ -65,12 +50,12 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
                 "clock": f"2026-05-{number % 28 + 1:02}T{number % 24:02}:30:07+02:00",
                 "speed": round(float(90 * rng.random()), 1),
                 "lines": ("", "north → south", "south → north")[rng.integers(3)],
-                **unknown,
-                **empty,
+                **dict.fromkeys(("distance", "lane")),
+                **dict.fromkeys(("motion", "side", "size", "picture", "clip"), ""),
             }
             for n in range(each)
         ]
-        summary = {
+        written[f"day{number // 100}/clip{number:05}"] = {
             "page": f"clip{number:05}.page/page.html",
             "start": 0.0,
             "seconds": 600,
@@ -83,48 +68,7 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
             "rows": rows,
             "review": "",
         }
-        written[f"day{number // 100}/clip{number:05}"] = summary
     write_index(written, path)
-
-
-def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
-    """Return the page of an hour."""
-    rng = np.random.default_rng(1)
-    records = []
-    for number in range(1, vehicles + 1):
-        first, seconds = float(rng.random() * (length - 8)), float(2 + 5 * rng.random())
-        x, y = np.linspace(300, 900, 40), np.linspace(300, 650, 40)
-        times, places = first + np.linspace(0, seconds, 40), np.stack([x, y], axis=1) / 30
-        speeds = Speeds(
-            times, places, np.full(40, 8 + 6 * rng.random()), np.full(40, 0.2), 0.01, 4.5
-        )
-        box = Box.sized(860, 560, 80, 60)
-        states: Counter[State] = Counter({"detected": int(25 * seconds)})
-        records.append(
-            VehicleRecord(
-                *(number, WIDTH, first, first + seconds, box, seconds),
-                states=states,
-                path=list(zip(x.tolist(), y.tolist(), strict=True)),
-                followed=[(first, first + seconds)],
-                speeds=speeds,
-                motion="drove",
-            )
-        )
-    thumbnails = {record.id: jpeg_uri(STILL) for record in longest(records)}
-    info = VideoInfo(Path("hour.mp4"), WIDTH, HEIGHT, Fraction(25), Fraction(1, 25))
-    still = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    page = VideoPage(
-        video=info,
-        frames=int(25 * length),
-        spans=[(0.0, length)],
-        records=records,
-        thumbnails=thumbnails,
-        poster=still,
-        still=still,
-        player=None,
-        settings="",
-    )
-    return page.html()
 
 
 def in_chromium(page: Path, changes: Mapping[str, str]) -> Any:
@@ -146,15 +90,8 @@ def main() -> None:
         page, begin = Path(name) / "index.html", time.perf_counter()
         index_page(page)
         print(f"index of 100,000 vehicles: {time.perf_counter() - begin:.2f} s to make")
-        if shutil.which("chromium"):
-            for what, taken in in_chromium(page, {UPDATE: FIRST, "</body>": MEASURES}).items():
-                print(f"  {what}: {taken:.0f} ms")
-    video_page()  # the first one loads packages
-    begin = time.process_time()
-    video_page()
-    print(
-        f"page of 1,200 vehicles with speeds: {time.process_time() - begin:.2f} s of a core to make"
-    )
+        for what, taken in in_chromium(page, {UPDATE: FIRST, "</body>": MEASURES}).items():
+            print(f"  {what}: {taken:.0f} ms")
 
 
 if __name__ == "__main__":

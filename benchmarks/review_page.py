@@ -11,15 +11,15 @@ presses keys. Then the corrections are applied, and must give the true counts.
 import json
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.corrections import by_class
 from benchmarks.pages import in_chromium
 from benchmarks.pole_cameras import MIN_WIDTH
 from vdet.boxes import NO_BOXES, Image
@@ -145,23 +145,6 @@ document.title = JSON.stringify({ firstView, view, each, empty, times, correctio
 
 
 @dataclass(frozen=True)
-class Error:
-    """What a reviewer sees: `kind` is missed, false or class; `class` is the true one."""
-
-    kind: str
-    id: int
-    seconds: float
-    position: float
-    direction: str
-    name: str
-
-    def values(self) -> dict[str, Any]:
-        """Return it for the script."""
-        values = asdict(self)
-        return values | {"class": values.pop("name")}
-
-
-@dataclass(frozen=True)
 class Hour:
     """A road, its vehicles with their classes, and the numbers of the wrong ones."""
 
@@ -235,35 +218,32 @@ def hour(seed: int = 1) -> Hour:
     return Hour(road, classes, missed, false, renamed)
 
 
-@dataclass(frozen=True)
-class Survey:
-    """The counts of the page, the true ones, and where the vehicles pass the line."""
+def errors_of(
+    road: Hour, counts: Counts, true: Counts, passages: Sequence[BandPassage]
+) -> list[dict[str, Any]]:
+    """Return what a reviewer sees, for the script, in the order of time.
 
-    counts: Counts
-    true: Counts
-    passages: Sequence[BandPassage]
-
-    def errors(self, road: Hour) -> list[Error]:
-        """Return the errors in the order of time."""
-        kinds = {**dict.fromkeys(road.missed, "missed"), **dict.fromkeys(road.renamed, "class")}
-        events = [event for event in self.true.events if event.id in kinds]
-        events += [event for event in self.counts.events if event.id in road.false]
-        positions = {passage.id: passage.position for passage in self.passages}
-        return [
-            Error(
-                kind=kinds.get(event.id, "false"),
-                id=event.id,
-                seconds=event.time,
-                position=positions.get(event.id, 0.5),
-                direction=event.direction,
-                name=road.classes[event.id],
-            )
-            for event in sorted(events, key=lambda event: event.time)
-        ]
+    `kind` is missed, false or class; `class` is the true one.
+    """
+    kinds = {**dict.fromkeys(road.missed, "missed"), **dict.fromkeys(road.renamed, "class")}
+    events = [event for event in true.events if event.id in kinds]
+    events += [event for event in counts.events if event.id in road.false]
+    positions = {passage.id: passage.position for passage in passages}
+    return [
+        {
+            "kind": kinds.get(event.id, "false"),
+            "id": event.id,
+            "seconds": event.time,
+            "position": positions.get(event.id, 0.5),
+            "direction": event.direction,
+            "class": road.classes[event.id],
+        }
+        for event in sorted(events, key=lambda event: event.time)
+    ]
 
 
-def write_page(road: Hour, folder: Path) -> Survey:
-    """Write the page, and return what it should show."""
+def write_page(road: Hour, folder: Path) -> tuple[Counts, Counts, list[dict[str, Any]]]:
+    """Write the page; return its counts, the true ones, and the errors that a reviewer sees."""
     camera = road.scene.camera
     video = VideoInfo(Path("hour.mp4"), camera.width, camera.height, RATE, 1 / RATE)
     traffic, true = (LiveTraffic(SETTINGS, camera.width, camera.height) for _ in range(2))
@@ -285,12 +265,7 @@ def write_page(road: Hour, folder: Path) -> Survey:
     counts, true_counts = traffic.counts(), true.counts()
     assert counts
     assert true_counts
-    return Survey(counts, true_counts, passages.by_band[0])
-
-
-def by_class(counts: Counts) -> Counter[tuple[str, str | None]]:
-    """Return the number of events by direction and class."""
-    return Counter((event.direction, event.class_name) for event in counts.events)
+    return counts, true_counts, errors_of(road, counts, true_counts, passages.by_band[0])
 
 
 def main() -> None:
@@ -298,13 +273,11 @@ def main() -> None:
     road = hour()
     with tempfile.TemporaryDirectory() as name:
         folder, begin = Path(name), time.perf_counter()
-        survey = write_page(road, folder / "review")
-        counts, true, errors = survey.counts, survey.true, survey.errors(road)
+        counts, true, errors = write_page(road, folder / "review")
         page = folder / "review" / REVIEW_NAME
         print(f"{len(counts.events)} counted, {len(true.events)} true, {len(errors)} errors")
         print(f"page: {page.stat().st_size / 1e6:.1f} MB, {time.perf_counter() - begin:.0f} s")
-        values = json.dumps([error.values() for error in errors])
-        script = ACTIONS.replace("ERRORS_OF_HOUR", values)
+        script = ACTIONS.replace("ERRORS_OF_HOUR", json.dumps(errors))
         measured = in_chromium(page, {"</body>": script})
         print(
             f"first view: {measured['firstView']:.0f} ms, with pictures {measured['view']:.0f} ms"

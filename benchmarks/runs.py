@@ -1,5 +1,6 @@
 """Whole runs of the program: time with and without outputs and lanes, peak memory, and counting."""
 
+import json
 import os
 import subprocess
 import sys
@@ -13,15 +14,7 @@ from benchmarks.material import transcode
 from benchmarks.rounds import Task, measure_both, seconds_of
 from vdet.boxes import Box
 from vdet.config.loading import find_config, load_settings
-from vdet.config.scene import (
-    CameraSettings,
-    GroundPoint,
-    LineSettings,
-    RegionSettings,
-    TrafficSettings,
-    ZoneSettings,
-)
-from vdet.config.schema import DrawSettings, InputSettings, Settings, SvmSettings
+from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.labels.formats import TrackWriter, format_for
 from vdet.labels.label import SourceVideo
@@ -32,28 +25,23 @@ from vdet.run.video import Run, run_video
 from vdet.track.track import FrameTracks, Track
 
 FRAMES = 250
-REGION = RegionSettings(name="all", points=((0, 0), (1, 0), (1, 1), (0, 1)))
-"""It leaves nothing out."""
-
-TRAFFIC = TrafficSettings(
-    lines=tuple(
-        LineSettings(name=f"row {row}", start=(0, row), end=(1, row), left="up", right="down")
-        for row in (0.65, 0.7, 0.75)
-    ),
-    zones=(
-        ZoneSettings(name="near", points=((0.5, 0.6), (1, 0.6), (1, 1), (0.7, 1))),
-        ZoneSettings(name="left", points=((0, 0.6), (0.5, 0.6), (0.3, 1), (0, 1))),
-    ),
-)
-
-GROUND = tuple(
-    GroundPoint(pixel=pixel, metres=metres)
+TRAFFIC = {
+    "lines": [
+        {"name": f"row {row}", "start": (0, row), "end": (1, row)} for row in (0.65, 0.7, 0.75)
+    ],
+    "zones": [
+        {"name": "near", "points": [(0.5, 0.6), (1, 0.6), (1, 1), (0.7, 1)]},
+        {"name": "left", "points": [(0, 0.6), (0.5, 0.6), (0.3, 1), (0, 1)]},
+    ],
+}
+EVERYTHING = {"name": "all", "points": [(0, 0), (1, 0), (1, 1), (0, 1)]}  # leaves nothing out
+GROUND = [  # the numbers do not change the time of speeds
+    {"pixel": pixel, "metres": metres}
     for pixel, metres in (
         ((0.15, 0.95), (0, 0)), ((0.85, 0.95), (7.4, 0)),
         ((0.58, 0.62), (7.4, 30)), ((0.44, 0.62), (0, 30)),
     )
-)  # fmt: skip
-"""Points on the road; the numbers do not change the time of speeds."""
+]  # fmt: skip
 
 
 def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, float]]:
@@ -63,18 +51,17 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
     detected, drawn and written), `detect with lanes`, `detect with svm`, `detect with answers`
     (a region, trails, counts and records of vehicles too), `detect with flows` (flows by the clock,
     and speeds, at the lines of `TRAFFIC`), `detect only` and `detect only with svm` (nothing
-    written).
+    written), `played` (the length of these frames).
     """
     out = folder / "out.mp4"
     video = (Output("video", out),)
     files = Output("counts", folder / "counts.csv"), Output("vehicles", folder / "cars.csv")
     default, svm = Settings(), Settings(detector=SvmSettings())
     lanes = load_settings([find_config("project-camera")], ["lanes.enabled=true"])
-    answering = Settings(regions=(REGION,), traffic=TRAFFIC, draw=DrawSettings(trails=2))
-    counting = Settings(
-        traffic=TRAFFIC,
-        camera=CameraSettings(ground=GROUND),
-        input=InputSettings(begin="2026-05-01 07:00"),
+    regions = {"regions": [EVERYTHING], "draw": {"trails": 2}}
+    clock = {"camera": {"ground": GROUND}, "input": {"begin": "2026-05-01 07:00"}}
+    answering, counting = (
+        Settings.model_validate({"traffic": TRAFFIC} | more) for more in (regions, clock)
     )
     traffic = Output("flows", folder / "flows.csv"), Output("counts", folder / "counts.csv")
     model, linear = load_detector(default.detector), load_detector(svm.detector)
@@ -94,7 +81,9 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
         "detect only": partial(detect, model, ()),
         "detect only with svm": partial(detect, linear, (), svm),
     }
-    return measure_both(tasks, rounds)
+    with VideoReader(path, frames=FRAMES) as reader:
+        played = float(sum(1 for _ in reader) / reader.info.rate)
+    return measure_both(tasks, rounds) | {"played": (played, 0.0)}
 
 
 IMPORTS = "import numpy, cv2, av"
@@ -130,13 +119,6 @@ def start_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float,
     return measure_both(tasks, rounds)
 
 
-def seconds_of_video(path: Path) -> float:
-    """Return the playing time of the measured frames."""
-    with VideoReader(path, frames=FRAMES) as reader:
-        count = sum(1 for _ in reader)
-        return float(count / reader.info.rate)
-
-
 def peak_memory(path: Path, folder: Path, *options: str) -> float:
     """Return the peak memory of a run of the program, MB."""
     code = (
@@ -164,19 +146,12 @@ def seconds_of_count(folder: Path, suffix: str) -> float:
     """
     tracks, lines = folder / f"hour{suffix}", folder / "lines.yaml"
     write_hour(tracks)
-    lines.write_text(_lines(), encoding="utf-8")
+    ends = [((100, y), (1180, y + 20)) for y in (300, 350, 400, 470, 560)]
+    ends += [((x, 200), (x + 20, 700)) for x in (200, 400, 640, 850, 1080)]
+    named = [{"name": f"line {n}", "start": a, "end": b} for n, (a, b) in enumerate(ends)]
+    settings = {"camera": {"size": [WIDTH, HEIGHT]}, "traffic": {"lines": named}}
+    lines.write_text(json.dumps(settings), encoding="utf-8")
     return seconds_of("-m", "vdet", "--quiet", "count", str(tracks), "-c", str(lines))
-
-
-def _lines() -> str:
-    rows = [((100, y), (1180, y + 20)) for y in (300, 350, 400, 470, 560)]
-    columns = [((x, 200), (x + 20, 700)) for x in (200, 400, 640, 850, 1080)]
-    lines = [
-        f"    - {{name: line {number}, start: {list(start)}, end: {list(end)}}}\n"
-        for number, (start, end) in enumerate(rows + columns)
-    ]
-    camera = f"camera: {{size: [{WIDTH}, {HEIGHT}]}}\n"
-    return camera + "traffic:\n  lines:\n" + "".join(lines)
 
 
 def write_hour(path: Path, seed: int = 0) -> None:

@@ -117,9 +117,8 @@ def times_by_height(pictures: Sequence[Picture], svm: SvmModel, rounds: int) -> 
     images = [picture.image for picture in pictures[:3]]
     tasks: dict[str, Task] = {}
     for height in HEIGHTS:
-        width = images[0].shape[1] * height // images[0].shape[0]
-        scaled = [np.asarray(cv2.resize(image, (width, height)), np.uint8) for image in images]
-        planes = [Picture(Planes.of_image(image, Coding())) for image in scaled]
-        tasks[str(height)] = _search(svm, planes)
+        size = images[0].shape[1] * height // images[0].shape[0], height
+        scaled = [np.asarray(cv2.resize(image, size), np.uint8) for image in images]
+        tasks[str(height)] = _search(svm, [Picture(Planes.of_image(i, Coding())) for i in scaled])
     times = measure(tasks, rounds)
     return {name: seconds / len(images) for name, seconds in times.items()}

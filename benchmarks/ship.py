@@ -1,10 +1,10 @@
 """From the weights of a training to the shipped network: `make ship WEIGHTS=net.onnx`.
 
-The weights are those of `vdet train-net`, a network or a checkpoint, also of earlier code; with
-`--base`, a weighted mean of these and of the network from which the training started. The
-calibration of its scores comes from the results of `make unseen`: that of the networks that were
-trained without what they were measured on, or, where these are not there, that of the same network.
-Without results, it is that of the base.
+The weights are those of `vdet train-net`, a network or a checkpoint; with `--base`, a weighted mean
+of these and of the network from which the training started. The calibration of its scores comes
+from the results of `make unseen`: that of the networks that were trained without what they were
+measured on, or, where these are not there, that of the same network. Without results, it is that of
+the base.
 """
 
 import argparse
@@ -34,17 +34,15 @@ def from_checkpoint(path: Path, output: Path, base: Header | None) -> None:
 
     state: dict[str, Any] = torch.load(path, weights_only=True)
     settings = dict(state["settings"])
-    network = Network(len(settings["classes"]), settings.get("channels", 1.0))
+    network = Network(len(settings["classes"]), settings["channels"])
     network.load_state_dict(state["averaged"])
     sources = [{"name": name, "images": count} for name, count in settings.pop("sources")]
-    settings.pop("base", None)
-    provenance: dict[str, Any] = {
-        "training": settings,
-        "report": {"sources": sources, "steps": state["step"]},
-    }
+    settings.pop("base")
+    report = {"sources": sources, "steps": state["step"]}
+    provenance: dict[str, Any] = {"training": settings, "report": report}
     if base is not None:
         provenance["base"] = base.provenance
-    width, height = settings.get("size") or (settings["width"], settings["height"])
+    width, height = settings["size"]
     header = Header(classes=settings["classes"], pixels=width * height, provenance=provenance)
     export_network(network, header, output, overwrite=True)
 
@@ -90,16 +88,13 @@ def ship(
         The weights or the base are not those of a network of ours, or the results have no
         calibration for it.
     """
-    calibrated: dict[str, Any] = {}
     before = onnx.load(str(base)) if base else None  # the output may replace it
     base_header = _header(base) if base else None
-    if base_header is not None:
-        calibrated = base_header.model_dump(include={"calibration", "by_class"})
+    calibrated = base_header.model_dump(include={"calibration", "by_class"}) if base_header else {}
+    source = weights
     if weights.suffix == ".ckpt":
         from_checkpoint(weights, output, base_header)
         source = output
-    else:
-        source = weights
     header = _header(source)
     if results is not None:
         values = json.loads(results.read_text(encoding="utf-8"))

@@ -23,6 +23,7 @@ from benchmarks.material import find_video
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import OutputSettings, Settings
 from vdet.detect.detectors import as_model
+from vdet.evaluate import report
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.loop import Parts
@@ -142,36 +143,27 @@ def _speed(start: Sample, end: Sample) -> float:
 def table(samples: Sequence[Sample]) -> list[str]:
     """Return some of the samples as lines, each with the speed since the line before."""
     step = max(1, (len(samples) - 1) // (ROWS - 1))
-    shown = [*samples[:-1:step], samples[-1]]
-    lines = ["frames  frames/s  memory MB  peak MB  files  threads"]
-    for before, now in pairwise(shown):
-        lines.append(
-            f"{now.frames:6}  {_speed(before, now):8.1f}  {now.memory:9.0f}  {now.peak:7.0f}  "
-            f"{now.files:5}  {now.threads:7}"
-        )
-    return lines
+    rows = []
+    for before, now in pairwise([*samples[:-1:step], samples[-1]]):
+        values = f"{_speed(before, now):.1f}", f"{now.memory:.0f}", f"{now.peak:.0f}"
+        rows.append((str(now.frames), *values, str(now.files), str(now.threads)))
+    headings = "frames", "frames/s", "memory MB", "peak MB", "files", "threads"
+    return report.table(headings, rows)
 
 
 def loop_video(source: Path, target: Path, frames: int) -> None:
     """Repeat the packets of a video until it has at least `frames` frames; sound is left out."""
-    written, offset = 0, 0
-    with av.open(str(target), "w") as output:
-        stream: av.VideoStream | None = None
-        while written < frames:
-            with av.open(str(source)) as reader:
-                video = reader.streams.video[0]
-                stream = stream or output.add_stream_from_template(video)
-                length = 0
-                for packet in reader.demux(video):
-                    if packet.dts is None or packet.pts is None:
-                        continue
-                    length = max(length, packet.pts + _duration(packet, video))
-                    packet.pts += offset
-                    packet.dts += offset
-                    packet.stream = stream
-                    output.mux(packet)
-                    written += 1
-            offset += length
+    with av.open(str(source)) as once:
+        length = sum(packet.dts is not None for packet in once.demux(video=0))
+    parts = target.with_suffix(".txt")
+    parts.write_text(f"file '{source.absolute()}'\n" * -(-frames // length), encoding="utf-8")
+    joined = av.open(str(parts), format="concat", options={"safe": "0"})
+    with joined as reader, av.open(str(target), "w") as output:
+        stream = output.add_stream_from_template(reader.streams.video[0])
+        for packet in reader.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                output.mux(packet)
 
 
 FIXED = Settings.model_validate(
@@ -191,11 +183,6 @@ def write_fixed(folder: Path) -> Path:
             image[110:130, left : left + 30] = 255
             writer.write(Frame(index, Fraction(index, 25), Picture(image.astype(np.uint8))))
     return path
-
-
-def _duration(packet: "av.Packet[av.VideoStream]", video: av.VideoStream) -> int:
-    rate, base = video.average_rate or Fraction(25), packet.time_base or Fraction(1, 25)
-    return packet.duration or round(1 / (rate * base))
 
 
 def main() -> None:

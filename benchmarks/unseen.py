@@ -13,9 +13,10 @@ import argparse
 import json
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from itertools import compress, repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from sklearn.linear_model import LogisticRegression
@@ -23,15 +24,15 @@ from sklearn.linear_model import LogisticRegression
 from vdet.boxes import BoolArray, Float64Array, Image, Int64Array
 from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
 from vdet.config.loading import load_settings
-from vdet.config.schema import NetworkSettings, Settings
+from vdet.config.schema import NetworkSettings
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.onnx.detector import NetworkDetector
-from vdet.detect.onnx.network import Header, ScoreCalibration, Session, read_header
+from vdet.detect.onnx.network import ScoreCalibration, Session, read_header
 from vdet.evaluate.report import RunName, figure, table, video_report
-from vdet.evaluate.results import Counting, MeasuredImage, best_f1, evaluate_images, evaluate_video
-from vdet.evaluate.scores import MATCH_IOU, ComparedFrame, RankedPredictions
+from vdet.evaluate.results import Counting, best_f1, evaluate_images, evaluate_video
+from vdet.evaluate.scores import MATCH_IOU, ComparedFrame, RankedPredictions, pool
 from vdet.files import json_text, write_whole
-from vdet.labels.images import LabelledImage, LabelledImages
+from vdet.labels.images import LabelledImages
 from vdet.labels.reading import Roles, read_labelled_images, read_truth
 
 OURS = "trained without them"
@@ -88,8 +89,7 @@ def deal(sets: Sequence[LabelledImages], folds: int) -> list[Int64Array]:
     return dealt
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(NamedTuple):
     """A detection: its set, its class, its score, and the class of what it finds, if anything."""
 
     set: str
@@ -102,7 +102,7 @@ class Finding:
 class Findings:
     """All detections of a network in some pictures, and the number of objects by set and class."""
 
-    rows: tuple[Finding, ...]
+    rows: Sequence[Finding]
     objects: dict[str, dict[str, int]]
 
     @classmethod
@@ -112,19 +112,13 @@ class Findings:
         for part in parts:
             for name, counts in part.objects.items():
                 objects[name].update(counts)
-        return cls(tuple(row for part in parts for row in part.rows), dict(objects))
-
-    def save(self, path: Path) -> None:
-        """Write the findings as JSON."""
-        rows = [[row.set, row.named, round(row.score, 5), row.found] for row in self.rows]
-        text = json_text({"objects": self.objects, "rows": rows})
-        write_whole(path, text, overwrite=True)
+        return cls([row for part in parts for row in part.rows], dict(objects))
 
     @classmethod
     def load(cls, path: Path) -> "Findings":
-        """Read findings that `save` has written."""
+        """Read findings that were written as JSON."""
         values = json.loads(path.read_text(encoding="utf-8"))
-        return cls(tuple(Finding(*row) for row in values["rows"]), values["objects"])
+        return cls([Finding(*row) for row in values["rows"]], values["objects"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,26 +143,20 @@ def measure(
     model: DetectorModel = load_detector(settings)
     if as_frames:
         model = _AsFrames(model)
-    rows, objects = [], {}
+    rows, objects = list[Finding](), {}
     for labelled in sets:
         name = Path(labelled.name).name
         counting = Counting(0.0, _MIN_WIDTHS[name in _HIGH])
         [measured] = evaluate_images([labelled], model, counting).sources
-        counts = Counter[str]()
-        for image in measured.images:
-            rows += [Finding(name, *item) for item in _findings(image)]
-            counts.update(image.every.vehicle_names)
-        objects[name] = dict(counts)
-    return Findings(tuple(rows), objects)
-
-
-def _findings(image: MeasuredImage) -> Iterator[tuple[str, float, str | None]]:
-    """Yield class, score and what it finds of each detection."""
-    every = image.every
-    for frame in every.frames:
-        named = [every.track_names[track] for track in frame.tracks.tolist()]
-        found = [None if row < 0 else every.vehicle_names[row] for row in _found(frame).tolist()]
-        yield from zip(named, frame.scores.tolist(), found, strict=True)
+        every = pool([image.every for image in measured.images])
+        names = (*every.vehicle_names, None)  # -1 is the last
+        for frame in every.frames:
+            named = [every.track_names[track] for track in frame.tracks.tolist()]
+            found = [names[row] for row in _found(frame).tolist()]
+            scores = frame.scores.round(5).tolist()
+            rows += map(Finding, repeat(name), named, scores, found)
+        objects[name] = dict(Counter(every.vehicle_names))
+    return Findings(rows, objects)
 
 
 def _found(frame: ComparedFrame) -> Int64Array:
@@ -179,13 +167,6 @@ def _found(frame: ComparedFrame) -> Int64Array:
             row = int(np.argmax(free[:, column]))
             found[column], free[row] = frame.vehicles[row], -1
     return found
-
-
-def ranked(rows: Sequence[Finding], right: Sequence[bool], objects: int) -> RankedPredictions:
-    """Return detections by descending score."""
-    scores = np.array([row.score for row in rows], np.float64)
-    order = np.argsort(-scores, kind="stable")
-    return RankedPredictions(scores[order], np.array([right], np.bool_)[:, order], objects)
 
 
 def fit(rows: Sequence[Finding], given: ScoreCalibration) -> ScoreCalibration:
@@ -210,19 +191,15 @@ def summarize(findings: Findings) -> dict[str, Any]:
     """Return the best F1 of every set and class, as JSON values."""
     totals = sum(map(Counter, findings.objects.values()), Counter[str]())
     by_class = _by_class(findings)
-    by_set: dict[str, list[Finding]] = {name: [] for name in findings.objects}
-    for row in findings.rows:
-        by_set[row.set].append(row)
     sets = {
-        name: _scores(by_set[name], None, sum(counts.values()))
+        name: _scores([row for row in findings.rows if row.set == name], None, sum(counts.values()))
         for name, counts in findings.objects.items()
         if counts
     }
+    order = (*STANDARD_CLASSES, *sorted(by_class)).index
     classes = {
         name: _scores([row for row in by_class[name] if row.found != UNKNOWN], name, totals[name])
-        for name in sorted(
-            by_class.keys() - {UNKNOWN}, key=(*STANDARD_CLASSES, *sorted(by_class)).index
-        )
+        for name in sorted(by_class.keys() - {UNKNOWN}, key=order)
     }
     return {"sets": sets, "classes": classes}
 
@@ -251,8 +228,10 @@ def _by_class(findings: Findings) -> dict[str, list[Finding]]:
 
 def _scores(rows: Sequence[Finding], name: str | None, objects: int) -> dict[str, float]:
     """Return the scores of detections; with a name, those are right that find its class."""
+    rows = sorted(rows, key=lambda row: -row.score)
     right = [row.found is not None if name is None else row.found == name for row in rows]
-    result = ranked(rows, right, objects)
+    scores = np.array([row.score for row in rows], np.float64)
+    result = RankedPredictions(scores, np.array([right], np.bool_), objects)
     best, at_score = best_f1([result])
     ap50, _ = result.average_precisions()
     return {"objects": objects, "best_f1": best, "at_score": at_score, "ap50": ap50}
@@ -273,24 +252,14 @@ def summary_lines(name: str, summary: dict[str, Any]) -> Iterator[str]:
     yield ""
 
 
-def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> list[str]:
-    """Return how well a network finds and follows the vehicles of a video."""
-    model = load_detector(NetworkSettings(model=str(network)))
-    video, truth = clip
-    roles = Roles.from_settings(settings)
-    found = evaluate_video(video, read_truth(truth, roles), settings, model)
-    return video_report([found], RunName("net", network, None)).lines
-
-
 class Unseen:
     """The trainings and measurements of all folds, kept in a folder."""
 
     def __init__(self, arguments: argparse.Namespace) -> None:
         self._work, self._folds = arguments.work, arguments.folds
-        rate = [] if arguments.base else [_FROM_RANDOM]
         steps = [f"train.net.steps={arguments.steps}"] if arguments.steps else []
-        self.settings = load_settings((), [*steps, *rate, *arguments.set])
-        self._base, self.clip = arguments.base, (arguments.video, arguments.truth)
+        self.settings = load_settings((), [*steps, _FROM_RANDOM, *arguments.set])
+        self._video, self._truth = arguments.video, arguments.truth
         self._paths = sorted(path for path in arguments.roads.iterdir() if path.is_dir())
         classes = self.settings.train.net.classes
         labels = Roles.of({}, (*classes, UNKNOWN))
@@ -317,13 +286,13 @@ class Unseen:
                 samples = [source.samples[number] for number in kept]
                 sources.append(replace(source, samples=samples))
         if fold < self._folds - 1:
-            sources.append(clip_source(*self.clip, self.settings))
+            sources.append(clip_source(self._video, self._truth, self.settings))
 
         def progress(step: int, loss: float) -> None:
             if step % 100 == 0:
                 print(f"{output.stem}: step {step}, loss {loss:.3f}", flush=True)
 
-        train_to_file(sources, self.settings.train.net, output, base=self._base, progress=progress)
+        train_to_file(sources, self.settings.train.net, output, progress=progress)
         return output
 
     def findings(self, network: Path, fold: int, *, as_frames: bool) -> Findings:
@@ -331,28 +300,22 @@ class Unseen:
         path = self._work / f"{'frames' if as_frames else 'images'}_{network.stem}_{fold}.json"
         if not path.exists():
             sets = [
-                replace(labelled, images=_those(labelled.images, folds == fold))
+                replace(labelled, images=tuple(compress(labelled.images, folds == fold)))
                 for labelled, folds in zip(self._sets, self._dealt, strict=True)
+                if fold in folds
             ]
-            sets = [labelled for labelled in sets if labelled.images]
             classes = self.settings.train.net.classes
-            measure(sets, network, classes, as_frames=as_frames).save(path)
+            found = measure(sets, network, classes, as_frames=as_frames)
+            write_whole(path, json_text(asdict(found)), overwrite=True)
             print(f"{path}: searched", flush=True)
         return Findings.load(path)
 
-
-def _those(pictures: Sequence[LabelledImage], flags: BoolArray) -> tuple[LabelledImage, ...]:
-    return tuple(pictures[number] for number in np.flatnonzero(flags).tolist())
-
-
-def trained_on(header: Header | None) -> list[str]:
-    """Return the names of the sets that one of our networks and its bases were trained on."""
-    names: list[str] = []
-    provenance: dict[str, Any] | None = header.provenance if header else None
-    while provenance:
-        names += [source["name"] for source in provenance["report"]["sources"]]
-        provenance = provenance.get("base")
-    return list(dict.fromkeys(names))
+    def video_lines(self, network: Path) -> list[str]:
+        """Return how well a network finds and follows the vehicles of the video."""
+        model = load_detector(NetworkSettings(model=str(network)))
+        truth = read_truth(self._truth, Roles.from_settings(self.settings))
+        found = evaluate_video(self._video, truth, self.settings, model)
+        return video_report([found], RunName("net", network, None)).lines
 
 
 def main() -> None:
@@ -365,7 +328,6 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=4000, help=steps)
     work = "networks and findings; other steps, folds and settings need another folder"
     parser.add_argument("--work", type=Path, default=Path("build/unseen"), help=work)
-    parser.add_argument("--base", type=Path, help="network that has seen no fold: the start")
     parser.add_argument("--model", type=Path, action="append", default=[], help="measured too")
     parser.add_argument(
         "--set", action="append", default=[], help="setting, as train.net.steps=2000"
@@ -390,12 +352,9 @@ def main() -> None:
         if header and not header.by_class:
             results[name] |= calibrate(frames, header.calibration)
         print("\n".join(summary_lines(name, results[name])))
-    for model in arguments.model:
-        header = read_header(Session(model))
-        print(f"{model} has seen: {', '.join(trained_on(header)) or 'not known'}")
     write_whole(arguments.work / "results.json", json_text(results), overwrite=True)
     if arguments.steps:
-        print("\n".join(video_lines(unseen.clip, networks[OURS], unseen.settings)))
+        print("\n".join(unseen.video_lines(networks[OURS])))
 
 
 if __name__ == "__main__":
