@@ -1,30 +1,26 @@
-"""What makes results doubtful: are the findings right, and how does recall depend on visibility?
-
-    python -m benchmarks.conditions                 # drawn roads that change: 3 minutes
-    python -m benchmarks.conditions pictures ROADS  # the weights of visibility: 2 minutes
+"""Are findings right when the conditions change? `python -m benchmarks.conditions`: 3 minutes.
 
 A drawn road is seen from a pole. After `CHANGE` seconds the camera shakes or is bumped, it becomes
 dark, foggy or blurred, or some vehicles are hidden from the tracker; the others have true boxes.
-The second command is explained in `benchmarks/visibility.py`.
 """
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import cv2
 import numpy as np
 
+from benchmarks.drawn_traffic import true_tracks
 from vdet.boxes import Boxes, Image
 from vdet.conditions.watch import Conditions
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.findings import Findings
+from vdet.labels.label import boxes_of
 from vdet.media import Picture
 from vdet.synthetic.render import Renderer, true_boxes
 from vdet.synthetic.scene import Scene, pole_scene
-from vdet.track.track import Track
 
 CHANGE = 4.0
 """Seconds after which the conditions change."""
@@ -148,15 +144,14 @@ class Road:
         conditions = Conditions(SETTINGS, self.scene.camera.width)
         for index, image in self.images.items():
             time = self.scene.time(index)
-            boxes = [(item.id, item.box) for item in true_boxes(self.scene, index)]
+            tracks = true_tracks(self.scene, index)
             if kind == "hidden":
-                boxes = [(number, box) for number, box in boxes if number % _HIDDEN]
+                tracks = tuple(track for track in tracks if track.id % _HIDDEN)
             shown = image
             if kind in CHANGES and time >= CHANGE:
                 shown = CHANGES[kind](image, np.random.default_rng(self.seed), time)
-            tracks = [Track(number, box, 0.9, "detected") for number, box in boxes]
-            sides = [(box.x1, box.y1, box.x2, box.y2) for _, box in boxes]
-            conditions.add(time, Picture(shown), Boxes(sides, np.full(len(sides), 0.9)), tracks)
+            boxes = Boxes(boxes_of(tracks), np.full(len(tracks), 0.9))
+            conditions.add(time, Picture(shown), boxes, tracks)
         return conditions
 
     def is_right(self, kind: str, findings: Findings) -> bool:
@@ -179,10 +174,12 @@ class Road:
         )
 
 
-def compare_drawn(seeds: Sequence[int]) -> None:
+def main() -> None:
     """Print how often the right finding was there, by what changed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, nargs="+", default=range(12), help="of drawn roads")
+    seeds = parser.parse_args().seeds
     right = dict.fromkeys(EXPECTED, 0)
-    print(f"{len(seeds)} drawn roads: about {len(seeds) / 4:.0f} minutes", flush=True)
     for seed in seeds:
         road = Road.drawn(seed)
         results = {kind: road.is_right(kind, road.watched(kind).findings()) for kind in EXPECTED}
@@ -191,24 +188,6 @@ def compare_drawn(seeds: Sequence[int]) -> None:
         right = {kind: right[kind] + results[kind] for kind in EXPECTED}
     for kind, count in right.items():
         print(f"{kind:10} {count} of {len(seeds)}")
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, nargs="+", default=range(12), help="of drawn roads")
-    commands = parser.add_subparsers(dest="command")
-    pictures = commands.add_parser("pictures", help="write the weights of visibility")
-    pictures.add_argument("roads", type=Path, help="folder of sets of labelled pictures")
-    networks = "folder of make unseen: search each picture by a network that has not seen it"
-    pictures.add_argument("--networks", type=Path, help=networks)
-    pictures.add_argument("--number", type=int, default=24, help="of pictures of each set")
-    arguments = parser.parse_args()
-    if arguments.command is None:
-        compare_drawn(arguments.seeds)
-    else:
-        from benchmarks.visibility import measure_pictures
-
-        measure_pictures(arguments.roads, arguments.networks, arguments.number)
 
 
 if __name__ == "__main__":

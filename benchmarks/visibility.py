@@ -1,4 +1,4 @@
-"""How recall depends on visibility: `python -m benchmarks.conditions pictures ROADS`.
+"""How recall depends on visibility: `python -m benchmarks.visibility ROADS`, 2 minutes.
 
 Some pictures of each set in ROADS are searched as frames of a video, as they are and changed. Two
 logistic regressions tell from what one sees which fraction of the vehicles is found, and how likely
@@ -8,45 +8,38 @@ set is predicted by weights that are fitted to all other sets.
 With `--networks` each picture is searched by the network of `make unseen` that was trained without
 it. The shipped network has learnt the pictures, and finds more in them than elsewhere: without
 `--networks`, `LEARNT` is subtracted.
-
-Searches are kept in `build/conditions`: a stopped run resumes there.
 """
 
-import hashlib
+import argparse
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from benchmarks import conditions
 from benchmarks.conditions import CHANGES
 from benchmarks.unseen import deal
 from vdet.boxes import Float64Array, Int64Array
 from vdet.conditions import visibility
 from vdet.conditions.visibility import PLAIN, probability
 from vdet.conditions.watch import planes_of
-from vdet.config.loading import load_settings
+from vdet.config.kinds import NetworkSettings
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.onnx.detector import SHIPPED
-from vdet.evaluate.report import table
-from vdet.files import json_text, write_whole
 from vdet.labels.images import LabelledImage
 from vdet.labels.reading import read_labelled_images
 from vdet.media import Picture
 
-_WORK = Path("build/conditions")
+_WORK = Path("build/visibility")
 LEARNT = 0.46
 """By how much the log odds to find a vehicle are higher in pictures that a network has learnt.
 
 Measured with two networks: what the one that has learnt eleven sets gains in these over the other,
 less what it gains in eleven sets that both have learnt (90 % of resamplings: 0.30 to 0.65).
 """
-_SECONDS = 0.1
-"""Of processor time that a search takes, about."""
 _TURNS = "drops", "night", "drops", "fog", "drops", "blur"
 """How pictures are changed, in turn."""
 _CODES = {"night": "dark", "fog": "haze"}
@@ -72,15 +65,20 @@ class Searched:
 Searches = Sequence[Searched]
 
 
-def measure_pictures(roads: Path, folder: Path | None, number: int) -> None:
-    """Write the weights of `visibility`, and print what the other sets tell of each set.
-
-    `folder` has the networks and results of `make unseen`; so many pictures of a set are searched.
-    """
-    searches = _searched(roads, _of_folds(folder) if folder else [SHIPPED], number)
+def main() -> None:
+    """Write the weights of `visibility`, and print what the other sets tell of each set."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("roads", type=Path, help="folder of sets of labelled pictures")
+    help_ = "folder of make unseen: search each picture by a network that has not seen it"
+    parser.add_argument("--networks", type=Path, help=help_)
+    parser.add_argument("--number", type=int, default=24, help="of pictures of each set")
+    options = parser.parse_args()
+    networks = _of_folds(options.networks) if options.networks else [SHIPPED]
+    searches = _searched(options.roads, networks, options.number)
     weights = {"recall": _fit_recall(searches), "drops": _fit_drops(searches)}
-    if folder:
-        gain = _log_odds(_searched(roads, [SHIPPED], number)) - _log_odds(searches)
+    if options.networks:
+        of_shipped = _searched(options.roads, [SHIPPED], options.number)
+        gain = _log_odds(of_shipped) - _log_odds(searches)
         print(f"the shipped network has log odds that are {gain:.2f} higher: LEARNT")
     else:
         weights["recall"][-1] -= LEARNT
@@ -116,42 +114,16 @@ def _of_folds(folder: Path) -> list[Path]:
 
 def _searched(roads: Path, networks: Sequence[Path], number: int) -> list[Searched]:
     """Search some pictures of all sets, each by the network of its fold."""
-    files = *networks, Path(visibility.__file__), Path(__file__), Path(conditions.__file__)
-    digest = hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
-    work = _WORK / f"{digest[:12]}_{number}"
-    work.mkdir(parents=True, exist_ok=True)
-    settings = load_settings().detector
-    models = [
-        load_detector(settings.model_copy(update={"model": str(network)})) for network in networks
-    ]
+    models = [load_detector(NetworkSettings(model=str(network))) for network in networks]
     sets = [read_labelled_images(path) for path in sorted(roads.iterdir()) if path.is_dir()]
-    chosen = [_spread(len(labelled.images), number) for labelled in sets]
-    left = 2 * sum(map(len, chosen))
-    print(f"{left // 2} pictures, each as it is and changed: {_minutes(left)}", flush=True)
-    searches = []
-    for labelled, numbers, folds in zip(sets, chosen, deal(sets, len(networks)), strict=True):
-        path = work / f"{Path(labelled.name).name}.json"
-        if not path.exists():
-            found = [
-                item
-                for turn, number in enumerate(numbers)
-                for item in _both(path.stem, labelled.images[number], turn, models[folds[number]])
-            ]
-            write_whole(path, json_text([asdict(item) for item in found]), overwrite=True)
-        left -= 2 * len(numbers)
-        print(f"{path.stem}: searched; {_minutes(left)} left", flush=True)
-        rows = json.loads(path.read_text(encoding="utf-8"))
-        searches += [Searched(**row) for row in rows]
+    searches: list[Searched] = []
+    for labelled, folds in zip(sets, deal(sets, len(networks)), strict=True):
+        name, images = Path(labelled.name).name, labelled.images
+        spread = np.linspace(0, len(images) - 1, min(len(images), number)).astype(int)
+        for turn, chosen in enumerate(spread.tolist()):
+            searches += _both(name, images[chosen], turn, models[folds[chosen]])
+        print(f"{name}: searched", flush=True)
     return searches
-
-
-def _spread(every: int, number: int) -> Int64Array:
-    """Return the indices of a number of all pictures, evenly spread."""
-    return np.linspace(0, every - 1, min(every, number)).astype(np.int64)
-
-
-def _minutes(searches: int) -> str:
-    return f"about {searches * _SECONDS / 60:.1f} minutes"
 
 
 def _both(
@@ -234,15 +206,15 @@ def _recall_lines(searches: Searches, recalls: Float64Array) -> list[str]:
 
 
 def _drops_lines(searches: Searches, drops: Float64Array) -> list[str]:
-    """Return how often drops are reported in each set, where it is not dark, hazy or blurred."""
-    reported: dict[str, dict[str, list[bool]]] = defaultdict(lambda: {"": [], "drops": []})
+    """Return how often drops are reported where it is not dark, hazy or blurred."""
+    changes = np.array([item.change for item in searches])
     sees_well = visibility.dim(_looks(searches)) == ""
-    for item, chance, is_used in zip(searches, drops.tolist(), sees_well, strict=True):
-        if item.change in ("", "drops") and is_used:
-            for name in ("all sets", item.name):
-                reported[name][item.change].append(chance > visibility.LIKELY)
-    rows = [
-        [name, *(f"{sum(own)} of {len(own)}" for own in by_change.values())]
-        for name, by_change in reported.items()
-    ]
-    return table(("drops in", "as it is", "with drops"), rows)
+    lines = []
+    for name, change in (("as they are", ""), ("with drops", "drops")):
+        reported = drops[sees_well & (changes == change)] > visibility.LIKELY
+        lines.append(f"drops in images {name}: {reported.sum()} of {len(reported)}")
+    return lines
+
+
+if __name__ == "__main__":
+    main()
