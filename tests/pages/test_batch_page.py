@@ -21,7 +21,7 @@ def facts(*rows: Row, start: float = 0.0) -> dict[str, Any]:
 
 def row(number: int, kind: str | None, first: float, **more: Any) -> Row:
     unknown = dict.fromkeys(("clock", "speed", "distance", "lane"))
-    empty = dict.fromkeys(("lines", "motion", "side", "size", "picture", "clip"), "")
+    empty = dict.fromkeys(("lines", "motion", "side", "size", "certainty", "picture", "clip"), "")
     known = {"id": number, "class_name": kind, "first": first, "seconds": 1.5}
     return {**unknown, **empty, **known, **more}
 
@@ -38,6 +38,7 @@ VIDEOS = {
             lane=-1,
             side="left",
             size="near",
+            certainty="sure",
             clip="../a.clips/clip-1.mp4",
         ),
         row(2, None, 1.0, picture="../a.crops/vehicle-0002.jpg"),
@@ -89,6 +90,7 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
         "lane": [-1, None, None, None],
         "side": ["left", "", "", ""],
         "size": ["near", "", "", ""],
+        "certainty": ["sure", "", "", ""],
         "clip": ["a.page/../a.clips/clip-1.mp4", "", "", ""],
         "picture": ["", "a.page/../a.crops/vehicle-0002.jpg", "", ""],
     }
@@ -202,6 +204,7 @@ seen.second = shownRows().map(row => row[4]);
 form.reset();
 change("side", "left");
 change("size", "near");
+change("certainty", "sure");
 seen.beside = shownRows().map(row => row[5]);
 """
     assert seen(index(tmp_path, VIDEOS), acts, tmp_path) == {

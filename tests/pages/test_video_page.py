@@ -218,11 +218,12 @@ def test_the_summary_has_the_counts_and_a_row_for_each_vehicle() -> None:
         nothing | {
             "id": 1, "class_name": None, "first": 0.0, "seconds": 2.0, "side": "left",
             "clock": "2026-05-01T07:00:00+00:00", "lines": "north → south", "size": "near",
-            "picture": "../a.crops/vehicle-0001.jpg",
+            "certainty": "sure", "picture": "../a.crops/vehicle-0001.jpg",
         },
         nothing | {
             "id": 2, "class_name": "truck", "first": 2.0, "seconds": 0.1, "side": "left",
             "clock": "2026-05-01T07:00:02+00:00", "lines": "", "size": "far", "picture": "",
+            "certainty": "unsure",
         },
     ]  # fmt: skip
 

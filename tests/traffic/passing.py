@@ -24,9 +24,11 @@ def passing(count: int, number: int = 1, speed: int = 2) -> Iterator[FrameTracks
         yield frame(index, track(number, Box.sized(10 + speed * index, 100, 40, 30)))
 
 
-def summarize(frames: Iterable[FrameTracks], width: int) -> tuple[VehicleRecord, ...]:
+def summarize(
+    frames: Iterable[FrameTracks], width: int, *, is_still: bool = False
+) -> tuple[VehicleRecord, ...]:
     """Return a record of each vehicle, by id; `width` is that of the frames in pixels."""
     records = VehicleRecords(width)
     for frame in frames:
         records.add(frame)
-    return records.end()
+    return records.end(is_still=is_still)

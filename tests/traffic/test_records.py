@@ -43,6 +43,21 @@ def test_what_one_frame_shows_has_no_record() -> None:
     assert records(frame(0), frame(1, track(1, PLACE)), frame(2)) == []
 
 
+@pytest.mark.parametrize(
+    ("count", "score", "is_sure"),
+    [(12, 0.59, None), (13, 0.59, False), (12, 0.6, False), (13, 0.6, True)],
+)
+def test_before_a_moving_camera_what_is_neither_long_nor_certain_has_no_record(
+    count: int, score: float, is_sure: bool | None
+) -> None:
+    frames = [frame(n, track(1, PLACE, score=score)) for n in range(count)]
+    of_moving, of_fixed = (
+        summarize(frames, WIDTH, is_still=is_still) for is_still in (False, True)
+    )
+    assert [item.is_sure for item in of_moving] == ([] if is_sure is None else [is_sure])
+    assert [item.is_sure for item in of_fixed] == [bool(is_sure)]
+
+
 def test_the_smallest_distance_and_the_usual_lane_are_kept() -> None:
     places = [(30.0, -1), (0.0, 0), (25.0, 0), (None, None)]
     frames = (

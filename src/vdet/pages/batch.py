@@ -19,15 +19,16 @@ NO_STILL = "data:image/jpeg;base64,"
 """Thumbnail of a video without a frame."""
 _COLUMNS = (
     *("id", "first", "seconds", "speed", "lines", "motion", "distance", "lane"),
-    *("side", "size"),
+    *("side", "size", "certainty"),
 )
 _EMPTY = (None, "")
 Row = Mapping[str, Any]
 """A vehicle in the table of a video or of a batch.
 
 Its columns are those of records, and `class_name`; `lines`, the lines and zones where it was
-counted, in order; `side` and `size`, where its largest box is in the picture; `picture` and `clip`,
-their addresses relative to the page of its video. Unknown values are None or empty.
+counted, in order; `side` and `size`, where its largest box is in the picture; `certainty`, "sure"
+if `VehicleRecord.is_sure`, else "unsure"; `picture` and `clip`, their addresses relative to the
+page of its video. Unknown values are None or empty.
 """
 Summaries = Mapping[str, Mapping[str, Any]]
 """The `summary` of an output of each video, by its name; `page` is relative to its folder."""

@@ -160,6 +160,7 @@ class VideoPage:
                 "motion": record.motion or "",
                 "side": _SIDES[min(2, int(3 * record.largest.center[0] / record.frame_width))],
                 "size": "near" if record.largest.width > _NEAR * record.frame_width else "far",
+                "certainty": "sure" if record.is_sure else "unsure",
                 "picture": pictures.get(record.id, ""),
                 "clip": self.clips.get(record.id, ""),
             }

@@ -32,6 +32,11 @@ _STANDING = 60.0
 _GLIMPSE = 0.05
 """Seconds; what is shown for less, such as in one frame at the edge of a region, has no record."""
 
+_SHORT, _HIGH = 0.5, 0.6
+"""A sure vehicle is shown for at least these seconds, with at least this best score. What reaches
+neither before a camera that may move has no record: it is often a sign or a building.
+"""
+
 Motion = Literal["drove", "standing", "unknown"]
 """Whether a vehicle moved, as seen by a still camera; "unknown": it did not, but was shown for less
 than a minute.
@@ -103,6 +108,11 @@ class VehicleRecord:
     def has_moved(self) -> bool:
         """Whether it moved, or may have, because the camera may have moved."""
         return self.motion in (None, "drove")
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it was shown for at least half a second, with a best score of at least 0.6."""
+        return self.seconds >= _SHORT and self.best_score >= _HIGH
 
     @property
     def mean_score(self) -> float:
@@ -201,6 +211,7 @@ class VehicleRecords:
             record
             for _, record in sorted(self._vehicles.items())
             if not 0 < record.seconds < _GLIMPSE
+            and (is_still or record.seconds >= _SHORT or record.best_score >= _HIGH)
         ]
         if is_still:
             for record in records:

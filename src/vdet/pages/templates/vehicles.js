@@ -13,7 +13,7 @@ data.counts.forEach((count, video) => {
 });
 const known = new Set(Object.keys(data));
 if (data.names.length < 2) known.delete("video");
-for (const name of ["lines", "motion", "side", "size", "speed", "distance", "lane", "clock", "picture", "clip"]) {
+for (const name of ["lines", "motion", "side", "size", "certainty", "speed", "distance", "lane", "clock", "picture", "clip"]) {
   data[name] ??= new Array(data.class.length).fill(null);
 }
 
@@ -85,7 +85,7 @@ function filtered() {
   };
   const clockTime = value => value && String(Date.parse(`${value}Z`) / 1000);
   const inSeconds = value => value && String(value.split(":").reduce((sum, part) => 60 * sum + Number(part), 0));
-  ["class", "lines", "motion", "side", "size", "lane"].forEach(choice);
+  ["class", "lines", "motion", "side", "size", "certainty", "lane"].forEach(choice);
   for (const name of ["seconds", "speed", "distance"]) {
     limits(data[name], values[`${name}-min`], values[`${name}-max`]);
   }
@@ -198,7 +198,7 @@ function fill(name) {
 const head = document.querySelector("#found thead tr");
 if (known.has("picture")) head.append(document.createElement("th"));
 head.append(...columns.map(heading));
-["class", "lines", "motion", "side", "size"].forEach(fill);
+["class", "lines", "motion", "side", "size", "certainty"].forEach(fill);
 const lanes = [...new Set(data.lane)].filter(lane => lane !== null).sort((a, b) => a - b);
 form.elements.lane.append(...lanes.map(lane => new Option(lane)));
 for (const element of form.querySelectorAll("[data-needs]")) {
