@@ -1,4 +1,4 @@
-"""Make docs/vdet.jpg, docs/counts.jpg and docs/stages.jpg: the program on drawn roads."""
+"""Make the pictures of docs/: the program on drawn roads. That of a strip needs Chromium."""
 
 import subprocess
 import sys
@@ -25,6 +25,8 @@ from vdet.synthetic.scene import (
 
 FOLDER = Path(__file__).parent
 COUNTED_FRAME = 62  # of the demo's pole: half of the vehicles are counted
+STRIP = 1400, 2220, 20, 770
+"""Top, bottom, left and right of the part of the review page with six vehicles, pixels."""
 STAGES = ("1-windows", "3-hits", "4-heat", "6-boxes")
 
 _SEED = 11
@@ -67,6 +69,20 @@ def frame_with_vehicles(source: Path, index: int, *words: str) -> Image:
         return next(frame.image for frame in reader if frame.index == index)
 
 
+def strip(folder: Path) -> Image:
+    """Write the review of the demo's pole camera, and return a part of its page."""
+    source, review, shown = folder / "pole.mp4", folder / "review", folder / "review.png"
+    program = (sys.executable, "-m", "vdet", "detect-video", str(source), "--no-video")
+    words = ("-c", str(folder / "gate.yaml"), "--review", str(review))
+    subprocess.run([*program, *words], check=True)
+    browser = ("chromium", "--headless=new", "--no-sandbox", "--window-size=1400,2400")
+    address = (review / "review.html").resolve().as_uri()
+    command = [*browser, f"--screenshot={shown}", address]
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+    top, bottom, left, right = STRIP
+    return read_image(shown)[top:bottom, left:right]
+
+
 def _settings(*assignments: str) -> list[str]:
     return [word for each in assignments for word in ("--set", each)]
 
@@ -93,6 +109,7 @@ def main() -> None:
             "vdet": frame_with_vehicles(road, 21, *label),
             "counts": frame_with_vehicles(demo / "pole.mp4", COUNTED_FRAME, *counts),
             "stages": stages(demo / "stages"),
+            "strip": strip(demo),
         }
     for name, image in pictures.items():
         _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 88])
