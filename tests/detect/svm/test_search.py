@@ -266,8 +266,6 @@ PAIRS = {
     "enlarged": grid_of(48, overlap=0.8),
     "enlarged, third pixels": grid_of(48, overlap=0.85),
 }
-"""Row of the horizon of the drawn road."""
-
 FEW = 0.92
 """Minimum fraction of equal decisions in a small grid, where a few near 0.5 are some percent."""
 

@@ -95,13 +95,6 @@ class TestParts:
 
 
 class TestRegions:
-    def test_a_region_has_the_votes_whose_middle_lies_in_it(self) -> None:
-        one, other = Box.sized(0, 0, 200, 200), Box.sized(200, 0, 200, 200)
-        votes = [exactly(LEFT, 1), exactly(moved_to(LEFT, 300, 100), 1)]
-        assert boxes(split(votes, one)) == [LEFT]
-        assert boxes(split(votes, other)) == [moved_to(LEFT, 300, 100)]
-        assert boxes(split(votes, other, one)) == [moved_to(LEFT, 300, 100), LEFT]
-
     @pytest.mark.parametrize(
         "aside", [(Box.sized(130, 90, 100, 100),), (Box.sized(400, 90, 9, 9), EVERYWHERE)]
     )
@@ -129,14 +122,6 @@ class TestCollecting:
         assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 11, 20], [50, 0, 60, 20]]
         assert votes.presence.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
         assert votes.boxes.dtype == votes.presence.dtype == votes.position.dtype == np.float64
-
-    def test_boxes_are_cut_off_at_the_sides_of_the_frame(self) -> None:
-        vehicles = [[90, 10, 30, 20], [-5, -5, 10, 10], [100, 0, 10, 10], [60, 95, 20, 20]]
-        ones = np.ones(4, np.float32)
-        windows = Windows(np.zeros((4, 4), np.int32), ones, ones, np.array(vehicles, np.float32))
-        votes = collected(windows)
-        assert votes.boxes.tolist() == [[90, 10, 100, 30], [0, 0, 5, 5], [60, 95, 80, 100]]
-        assert len(votes.presence) == len(votes.position) == 3
 
     def test_of_too_many_votes_the_best_positioned_are_kept_in_their_order(self) -> None:
         rng = np.random.default_rng(0)
