@@ -204,6 +204,33 @@ def sound_of(path: Path, track: int = 0) -> list[tuple[Fraction, bytes]]:
         ]
 
 
+def remuxed(
+    path: Path,
+    source: Path,
+    *,
+    first: int = 0,
+    copies: int = 1,
+    shift: int = 0,
+    tags: dict[str, str] | None = None,
+    muxing: dict[str, str] | None = None,
+) -> Path:
+    """Write the packets of a video, from `first` on, into each of `copies` streams of a file.
+
+    `shift` is added to their times, in the time base of the source.
+    """
+    options = muxing or {}
+    with av.open(source) as read, av.open(path, "w", container_options=options) as written:
+        written.metadata.update(tags or {})
+        streams = [written.add_stream_from_template(read.streams.video[0]) for _ in range(copies)]
+        packets = [packet for packet in read.demux(video=0) if packet.dts is not None]
+        for packet in packets[first:]:
+            packet.pts, packet.dts = (packet.pts or 0) + shift, (packet.dts or 0) + shift
+            for stream in streams:
+                packet.stream = stream
+                written.mux(packet)
+    return path
+
+
 def joined(path: Path, *parts: Path) -> Path:
     """Write a file of the bytes of others, one after the other."""
     path.write_bytes(b"".join(part.read_bytes() for part in parts))

@@ -1,16 +1,15 @@
 """Jump cuts of drawn roads, and what is none."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from benchmarks.zero import SIZE, cut_of, shot
+from benchmarks.zero import SIZE, cut_of, cuts_in, shot
 
 from red_cars import NullDetector
 from vdet.boxes import Box, Boxes, Image
-from vdet.conditions.cuts import with_cuts
 from vdet.findings import Finding
 from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.media import Frame, Picture
@@ -20,13 +19,6 @@ from vdet.track.track import Track
 from vdet.traffic.crossings import link_tracks
 
 SHOT = shot(1, 40)
-
-
-def cuts_in(images: Sequence[Image]) -> list[int]:
-    frames = (Frame(n, Fraction(n, 25), Picture(image)) for n, image in enumerate(images))
-    found = list(with_cuts((frame, frame.index) for frame in frames))
-    assert [index for index, _ in found] == list(range(len(images)))
-    return [index for index, is_cut in found if is_cut]
 
 
 @pytest.mark.parametrize("seed", range(4))

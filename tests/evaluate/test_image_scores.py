@@ -56,13 +56,6 @@ def scores(*pictures: Searched, counting: Counting = PLAIN) -> ImageScores:
     return source(*pictures, counting=counting).scores
 
 
-def test_all_found() -> None:
-    found = scores(Searched([at(0), at(300)], [(0.9, at(0)), (0.6, at(300))]), Searched([], []))
-    assert (found.images, found.vehicles, found.matches, found.false_positives) == (2, 2, 2, 0)
-    ratios = (found.precision, found.recall, found.f1, found.mean_iou, found.ap50, found.ap50_95)
-    assert ratios == pytest.approx((1, 1, 1, 1, 1, 1))
-
-
 def test_the_same_places_in_two_pictures_are_not_the_same_vehicles() -> None:
     """In video, a pair of the frame before stays together; pictures know no frame before."""
     first = Searched([at(0), at(300)], [(0.9, at(0)), (0.8, at(300))])
@@ -96,11 +89,6 @@ class TestBestF1:
         found = [(0.4, at(0)), (0.3, at(300)), (0.2, at(600)), (0.1, at(800))]
         result = scores(Searched([at(0), at(300)], found))
         assert (result.f1, result.best_f1, result.best_score) == (0, 1, 0.3)
-
-    def test_equal_scores_count_together(self) -> None:
-        found = [(0.6, at(0)), (0.6, at(600)), (0.6, at(800))]
-        result = scores(Searched([at(0)], found))
-        assert (result.best_f1, result.best_score) == (0.5, 0.6)
 
     lists = st.lists(
         st.tuples(

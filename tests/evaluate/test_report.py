@@ -16,7 +16,6 @@ from vdet.evaluate.report import (
     RunName,
     images_report,
     mistake_tiles,
-    table,
     tracks_report,
     video_report,
     worst_tiles,
@@ -54,13 +53,6 @@ class TestVideo:
         assert lines[8].split() == ["car", "2", "2", "0", "0.000", "0.000", "0.000", "bus", "2"]
         assert [value["named"] for value in report.values["classes"]] == [{"bus": 2}]
         assert "clip 1" in Elements(report.page()).text
-
-    def test_one_clip_is_its_own_total(self) -> None:
-        report = video_report(self.clips(TEN), NAME)
-        lines, values = report.lines, report.values
-        assert [line.split("  ")[0] for line in lines[2:5]] == ["video", "clip 0", ""]
-        assert (values["detector"], values["assignments"]) == ("svm", ("b=1",))
-        assert values["total"]["f1"] == values["videos"][0]["f1"] == 1
 
     def test_only_frames_that_the_truth_covers_are_compared(self, tmp_path: Path) -> None:
         found, truth = tmp_path / "found.txt", tmp_path / "gt.txt"
@@ -132,17 +124,3 @@ class TestPictures:
         assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarm")
         for color in (TRUE, DETECTED):
             assert np.any((first.image == color).all(axis=2))
-
-
-def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
-    assert table(("name", "n"), [["a", "100"], ["longer", "1"]]) == [
-        "name      n",
-        "a       100",
-        "longer    1",
-    ]
-
-
-def test_a_run_names_its_detector_model_and_settings() -> None:
-    name = RunName("net", Path("x/a.onnx"), None, ("b=1",))
-    assert name.line.endswith(", detector net, model a.onnx, settings default b=1")
-    assert name.values["model"] == "x/a.onnx"

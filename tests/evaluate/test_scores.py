@@ -20,12 +20,6 @@ from vdet.labels.label import NO_ID, SavedTracks
 from vdet.track.track import Track
 
 
-def test_a_loose_box_lowers_the_overlap_of_the_matches_only() -> None:
-    scores = score(video(drive(1, TEN, width=80)), video(drive(1, TEN)))
-    assert scores.mean_iou == pytest.approx(0.8)
-    assert (scores.f1, scores.mota, scores.idf1) == (1, 1, 1)
-
-
 def test_two_empty_videos_have_scores_too() -> None:
     scores = score(video(), video())
     assert (scores.vehicles, scores.tracks, scores.f1, scores.hota) == (0, 0, 0, 0)

@@ -12,7 +12,7 @@ import av
 import pytest
 from pydantic import ValidationError
 
-from clips import write_clip
+from clips import remuxed, write_clip
 from conftest import Run
 from vdet.config.scene import CameraSettings, ClockSettings, parse_date_time
 from vdet.config.schema import InputSettings, Settings
@@ -37,17 +37,8 @@ def time_zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def write_copy(path: Path, **tags: str) -> Path:
     """Write a clip, and a copy of it with these tags."""
-    with (
-        av.open(write_clip(path.with_stem("source"))) as source,
-        av.open(path, "w", container_options={"movflags": "use_metadata_tags"}) as target,
-    ):
-        target.metadata.update(tags)
-        stream = target.add_stream_from_template(source.streams.video[0])
-        for packet in source.demux(video=0):
-            if packet.dts is not None:
-                packet.stream = stream
-                target.mux(packet)
-    return path
+    source, flags = write_clip(path.with_stem("source")), {"movflags": "use_metadata_tags"}
+    return remuxed(path, source, tags=tags, muxing=flags)
 
 
 def clock_of(

@@ -27,7 +27,8 @@ hits = st.tuples(
 def windows_of(found: list[Hit]) -> Windows:
     """Return hits whose windows are elsewhere than their vehicles."""
     table = np.array(found, np.float32).reshape(-1, 6)
-    return Windows(np.zeros((len(table), 4), np.int32), *table[:, 4:].T, table[:, :4])
+    probabilities, weights = table[:, 4:].T
+    return Windows(np.zeros((len(table), 4), np.int32), probabilities, weights, table[:, :4])
 
 
 @given(st.lists(st.lists(hits, max_size=4), max_size=3))
