@@ -64,40 +64,51 @@ def test_a_time_that_is_given_is_taken() -> None:
     assert str(clock_of(name, "2026-01-01 07:00")) == "2026-01-01 07:00:00+01:00 (as given)"
 
 
-@pytest.mark.parametrize("created", [None, "", "1904-01-01T00:00:00Z", "yesterday"])
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("Gate_FR20_2026-05-01_07-00-00.mp4", "20260501_070000.mp4"),
-        *("cam1-2026.05.01 07.00.00.ts", "REC2026-05-01T07-00-00.jsonl", "20260501T050000Z.mp4"),
-        *("99999999_999999_20260501_070000.mp4", "DJI_20260501070000_0001_D.MP4"),
-        "2026_0501_070000_0001F.MP4",
-    ],
-)
-def test_a_time_in_the_name_is_local_time_or_utc_after_a_z(name: str, created: str | None) -> None:
-    assert str(clock_of(name, None, created)) == "2026-05-01 07:00:00+02:00 (from its name)"
+LOCAL = "2026-05-01T05:00:00+00:00"
+NAMES = {
+    **dict.fromkeys(
+        (
+            *("Gate_FR20_2026-05-01_07-00-00.mp4", "20260501_070000.mp4"),
+            *("cam1-2026.05.01 07.00.00.ts", "REC2026-05-01T07-00-00.jsonl"),
+            *("20260501T050000Z.mp4", "99999999_999999_20260501_070000.mp4"),
+            *("DJI_20260501070000_0001_D.MP4", "2026_0501_070000_0001F.MP4"),
+            *("20260501_070000-0001.mp4", "20260501_070000_left.720p.mp4"),  # a counter, a view
+        ),
+        LOCAL,
+    ),
+    "2026-05-01T05-00-00.123Z.mp4": "2026-05-01T05:00:00.123000+00:00",
+    "2026-05-01T05-00-00-123Z.mp4": "2026-05-01T05:00:00.123000+00:00",
+    "20260501T050000.123456789Z.mp4": "2026-05-01T05:00:00.123456+00:00",
+    "20260501T070000.5+0200.mp4": "2026-05-01T05:00:00.500000+00:00",
+    "20260501-123456+0200.mp4": "2026-05-01T10:34:56+00:00",
+    "20260501_070000-05:00.mp4": "2026-05-01T12:00:00+00:00",
+    "20260501_070000_UTC.mp4": "2026-05-01T07:00:00+00:00",
+    "2026-05-01 at 01.04.56\u202fPM.mov": "2026-05-01T11:04:56+00:00",
+    "2026-05-01 12.04.56 am.mov": "2026-04-30T22:04:56+00:00",
+}
+PATTERNS = {
+    ("x1 01.05.26 07h00m00.mp4", "%d.%m.%y %Hh%Mm%S"): LOCAL,
+    ("2019_1_14__16_6.mp4", "%Y_%m_%d__%H_%M"): "2019-01-14T15:06:00+00:00",
+    ("2022-06-01/12/cam/05.33.mp4", "%Y-%m-%d/%H/cam/%M.%S"): "2022-06-01T10:05:33+00:00",
+    ("1.5.26 1-4-56.25 PM +0300", "%d.%m.%y %I-%M-%S.%f %p %z"): "2026-05-01T10:04:56.250000+00:00",
+}
 
 
 @pytest.mark.parametrize(
-    ("name", "text"),
+    ("name", "pattern", "text"),
     [
-        ("2026-05-01T05-00-00.123Z.mp4", "2026-05-01T05:00:00.123000+00:00"),
-        ("2026-05-01T05-00-00-123Z.mp4", "2026-05-01T05:00:00.123000+00:00"),
-        ("20260501T050000.123456789Z.mp4", "2026-05-01T05:00:00.123456+00:00"),
-        ("20260501T070000.5+0200.mp4", "2026-05-01T05:00:00.500000+00:00"),
-        ("20260501-123456+0200.mp4", "2026-05-01T10:34:56+00:00"),
-        ("20260501_070000-05:00.mp4", "2026-05-01T12:00:00+00:00"),
-        ("20260501_070000_UTC.mp4", "2026-05-01T07:00:00+00:00"),
-        ("2026-05-01 at 01.04.56\u202fPM.mov", "2026-05-01T11:04:56+00:00"),
-        ("2026-05-01 12.04.56 am.mov", "2026-04-30T22:04:56+00:00"),
-        ("20260501_070000-0001.mp4", "2026-05-01T05:00:00+00:00"),  # a counter
-        ("20260501_070000_left.720p.mp4", "2026-05-01T05:00:00+00:00"),
+        *((name, None, text) for name, text in NAMES.items()),
+        *((name, pattern, text) for (name, pattern), text in PATTERNS.items()),
     ],
 )
-def test_what_follows_a_time_in_a_name_is_read(name: str, text: str) -> None:
-    clock = clock_of(name)
-    assert clock is not None
-    assert clock.zero.isoformat() == text
+def test_a_time_in_the_name_is_local_time_unless_it_has_a_zone(
+    name: str, pattern: str | None, text: str
+) -> None:
+    for created in (None, "", "1904-01-01T00:00:00Z", "yesterday"):
+        clock = clock_of(name, None, created, pattern=pattern)
+        assert clock is not None
+        assert clock.zero.isoformat() == text
+        assert str(clock).endswith("(from its name)")
 
 
 @pytest.mark.parametrize("suffix", ["-0500", "UTC+2", " CEST", "+02"])
@@ -109,26 +120,6 @@ def test_a_zone_that_is_not_read_leaves_no_clock(
     text = f"'{suffix.strip()}' after the time in its name may be a zone"
     advice = "set camera.clock.pattern, with %z for a zone"
     assert caplog.messages == [f"clips/{name}: {text}; {advice}"]
-
-
-@pytest.mark.parametrize(
-    ("name", "pattern", "text"),
-    [
-        ("2019_1_14__16_6.mp4", "%Y_%m_%d__%H_%M", "2019-01-14T15:06:00+00:00"),
-        ("2022-06-01/12/cam/05.33.mp4", "%Y-%m-%d/%H/cam/%M.%S", "2022-06-01T10:05:33+00:00"),
-        (
-            "1.5.26 1-4-56.25 PM +0300",
-            "%d.%m.%y %I-%M-%S.%f %p %z",
-            "2026-05-01T10:04:56.250000+00:00",
-        ),
-    ],
-)
-def test_a_pattern_has_folders_halves_of_days_zones_and_short_numbers(
-    name: str, pattern: str, text: str
-) -> None:
-    clock = clock_of(name, pattern=pattern)
-    assert clock is not None
-    assert clock.zero.isoformat() == text
 
 
 def test_saved_tracks_of_another_name_keep_their_clock() -> None:
@@ -266,9 +257,7 @@ def test_pictures_that_are_named_by_the_clock_say_when_they_begin(tmp_path: Path
     assert str(clock_of(tmp_path)) == "2026-05-01 07:00:50+02:00 (from its name)"
 
 
-def test_a_pattern_says_how_the_time_is_written() -> None:
-    found = clock_of("x1 01.05.26 07h00m05.mp4", None, "2020-01-01", pattern="%d.%m.%y %Hh%Mm%S")
-    assert str(found) == "2026-05-01 07:00:05+02:00 (from its name)"
+def test_a_name_that_does_not_match_the_pattern_is_refused() -> None:
     with pytest.raises(
         ConfigError, match=r"b\.mp4: its name does not match camera\.clock\.pattern"
     ):

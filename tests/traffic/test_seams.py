@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path as File
+from typing import Any
 
 import pytest
 
@@ -39,7 +40,7 @@ def write_part(
     clock: float = -1,
     scale: float = 1,
     kind: str | None = None,
-    height: int = CAR_HEIGHT,
+    height: float = CAR_HEIGHT,
 ) -> File:
     """Write a part of the tracks of 60 s into a file whose frames begin at 0.
 
@@ -96,32 +97,67 @@ def test_a_stay_goes_on_beyond_the_seam(tmp_path: File) -> None:
     assert row.max_stay == pytest.approx(16, abs=0.05)
 
 
-@pytest.mark.parametrize("begin", ["070009", "070011"])
-def test_clocks_have_whole_seconds(tmp_path: File, begin: str) -> None:
-    names = [FOLLOWING[0], f"v_20260501_{begin}.jsonl"]
-    (row,) = flow_table(count(write_halves(tmp_path, names, GOES_EAST)))
-    assert row.count == 1
+Flows = list[tuple[str, str | None, int]]
 
 
-def flows_of(videos: Sequence[Counts]) -> list[tuple[str, str | None, int]]:
+def flows_of(videos: Sequence[Counts]) -> Flows:
     return [(row.origin, row.destination, row.count) for row in flow_table(videos)]
 
 
-ONE_VEHICLE, TWO_VEHICLES = [("west", "east", 1)], [("west", None, 1), ("east", None, 1)]
+ONE_VEHICLE: Flows = [("west", "east", 1)]
+TWO_VEHICLES: Flows = [("west", None, 1), ("east", None, 1)]
+JUMPS = through((0, 100, 400), (9.96, 600, 400), (10, 600, 250), (20, 1100, 250))
+STOPS, GOES_ON = through((0, 100, 400), (30, 600, 400)), through((35, 600, 400), (45, 1100, 400))
+FAST = through((0, 100, 400), (5.5, 1200, 400))
+IN_A_LANE = [through((t, 100, 400), (t + 6, 1100, 400)) for t in (12, 20.5)]
+Part = tuple[str, float, float, Sequence[Path], dict[str, Any]]
+"""Name, first and last second, paths, and other arguments of `write_part`."""
 
 
-@pytest.mark.parametrize("second", ["b.jsonl", "v_20260501_080000.jsonl"])
-def test_files_that_do_not_follow_have_vehicles_of_their_own(tmp_path: File, second: str) -> None:
-    videos = count(write_halves(tmp_path, [FOLLOWING[0], second], GOES_EAST))
-    assert flows_of(videos) == TWO_VEHICLES
-    numbers = [{event.vehicle for event in video.events} for video in videos]
-    assert not numbers[0] & numbers[1]
+def two(second: str = FOLLOWING[1], path: Path = GOES_EAST, **known: Any) -> list[Part]:
+    """Return the first 10 s of a path, and the next 10 s in another file."""
+    return [(FOLLOWING[0], 0, 10, [path], {}), (second, 10, 20, [path], known)]
 
 
-def test_the_same_id_in_the_next_file_elsewhere_is_another_vehicle(tmp_path: File) -> None:
-    jumps = through((0, 100, 400), (9.96, 600, 400), (10, 600, 250), (20, 1100, 250))
-    rows = flow_table(count(write_halves(tmp_path, FOLLOWING, jumps)))
-    assert [(row.origin, row.destination) for row in rows] == [("west", None), ("east", None)]
+SEAMS: dict[str, tuple[list[Part], Flows]] = {
+    "a clock has whole seconds, this one early": (two("v_20260501_070009.jsonl"), ONE_VEHICLE),
+    "a clock has whole seconds, this one late": (two("v_20260501_070011.jsonl"), ONE_VEHICLE),
+    "the second has no clock": (two("b.jsonl"), TWO_VEHICLES),
+    "the second begins an hour later": (two("v_20260501_080000.jsonl"), TWO_VEHICLES),
+    "the same id goes on elsewhere": (two(path=JUMPS), TWO_VEHICLES),
+    "the frames of the second are smaller": (two(scale=0.5), TWO_VEHICLES),
+    "exact clocks show a short gap": (
+        [("a_1.jsonl", 0, 2, [FAST], {"clock": 0.001}),
+         ("a_2.jsonl", 2.52, 6, [FAST], {"clock": 2.521})],
+        ONE_VEHICLE,
+    ),
+    "what files are longer than their slots does not add up before a pause": (
+        [*((f"v_20260501_0700{s:02}.jsonl", s, s + 2.5, [STOPS], {}) for s in range(0, 30, 2)),
+         ("v_20260501_070035.jsonl", 35, 45, [GOES_ON], {})],
+        TWO_VEHICLES,
+    ),
+    "the next vehicle in a lane is no repeat": (
+        [("v_20260501_070000.jsonl", 0, 20, IN_A_LANE, {}),
+         ("v_20260501_070020.jsonl", 20, 40, IN_A_LANE, {})],
+        [("west", "east", 2)],
+    ),
+    "a file within another counts nothing": (
+        [("a.jsonl", 0, 20, [GOES_EAST], {"clock": 0}),
+         ("b.jsonl", 0, 10, [GOES_EAST], {"clock": 0}),
+         ("c.jsonl", 20, 30, [GOES_EAST], {"clock": 20})],
+        ONE_VEHICLE,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SEAMS)
+def test_a_vehicle_counts_once_where_files_follow_one_another(name: str, tmp_path: File) -> None:
+    parts, flows = SEAMS[name]
+    files = [
+        write_part(tmp_path / part, first, last, *paths, **known)
+        for part, first, last, paths, known in parts
+    ]
+    assert flows_of(count(files)) == flows
 
 
 @pytest.mark.parametrize("names", [("a.jsonl", "b.jsonl"), FOLLOWING])
@@ -132,27 +168,6 @@ def test_a_begin_is_that_of_the_first_of_several_files(
     files = write_halves(tmp_path, names, GOES_EAST)
     clocks = [str(counts.clock) for counts in count_files(files, settings).values()]
     assert clocks == [f"2026-01-02 03:04:{second}+00:00 (as given)" for second in ("00", "10")]
-
-
-def test_ends_do_not_add_up_before_a_pause(tmp_path: File) -> None:
-    goes, other = through((0, 100, 400), (30, 600, 400)), through((35, 600, 400), (45, 1100, 400))
-    files = []
-    for second in range(0, 30, 2):  # each half a second longer than its slot
-        name = f"v_20260501_0700{second:02}.jsonl"
-        files.append(write_part(tmp_path / name, second, second + 2.5, goes))
-    files.append(write_part(tmp_path / "v_20260501_070035.jsonl", 35, 45, other))
-    rows = flow_table(count(files))
-    assert [(r.origin, r.destination) for r in rows] == [("west", None), ("east", None)]
-
-
-def test_exact_clocks_show_a_short_gap(tmp_path: File) -> None:
-    fast = through((0, 100, 400), (5.5, 1200, 400))
-    files = [
-        write_part(tmp_path / "a_0001.jsonl", 0, 2, fast, clock=0.001),
-        write_part(tmp_path / "a_0002.jsonl", 2.52, 6, fast, clock=2.521),
-    ]
-    (row,) = flow_table(count(files))
-    assert (row.origin, row.destination, row.count) == ("west", "east", 1)
 
 
 @pytest.mark.parametrize(
@@ -274,16 +289,12 @@ def test_an_overlap_without_vehicles_loses_nothing(
     assert videos[1].spans == ((5, 12.96),)
 
 
-def test_no_vehicle_continues_over_a_change_of_frame_size(
+def test_an_overlap_of_other_frame_sizes_is_left_out(
     tmp_path: File, caplog: pytest.LogCaptureFixture
 ) -> None:
-    files = [
-        write_part(tmp_path / FOLLOWING[0], 0, 10, GOES_EAST),
-        write_part(tmp_path / FOLLOWING[1], 10, 20, GOES_EAST, scale=0.5),
-    ]
-    assert flows_of(count(files)) == TWO_VEHICLES
-    again = write_part(tmp_path / "v_20260501_070004.jsonl", 4, 14, GOES_EAST, scale=0.5)
-    assert flows_of(count([files[0], again])) == [("west", None, 1)]
+    names = zip((FOLLOWING[0], "v_20260501_070004.jsonl"), (0, 4), (1.0, 0.5), strict=True)
+    files = [write_part(tmp_path / n, s, s + 10, GOES_EAST, scale=scale) for n, s, scale in names]
+    assert flows_of(count(files)) == [("west", None, 1)]
     assert "begins 6.0 s before the end of" in caplog.text
 
 
@@ -305,28 +316,6 @@ def test_frames_that_the_next_file_repeats_count_once(
         f"{files[1]}: begins {repeated}.0 s before the end of {files[0]}; these frames are not "
         "counted again; if its clock is wrong, count it on its own"
     )
-
-
-def test_the_next_vehicle_in_a_lane_is_not_a_repeat(
-    tmp_path: File, caplog: pytest.LogCaptureFixture
-) -> None:
-    cars = [through((t, 100, 400), (t + 6, 1100, 400)) for t in (12, 20.5)]
-    files = [
-        write_part(tmp_path / "v_20260501_070000.jsonl", 0, 20, *cars),
-        write_part(tmp_path / "v_20260501_070020.jsonl", 20, 40, *cars),
-    ]
-    (row,) = flow_table(count(files))
-    assert (row.count, caplog.messages) == (2, [])
-
-
-def test_a_file_within_another_counts_nothing(tmp_path: File) -> None:
-    names = ["GX010001.jsonl", "GX020001.jsonl", "GX030001.jsonl"]
-    parts = [(0, 20, 0), (0, 10, 0), (20, 30, 20)]
-    files = [
-        write_part(tmp_path / name, first, last, GOES_EAST, clock=clock)
-        for name, (first, last, clock) in zip(names, parts, strict=True)
-    ]
-    assert [len(video.events) for video in count(files)] == [2, 0, 0]
 
 
 @pytest.mark.parametrize("crossed_at", [9.9602, 9.98, 9.9999])
