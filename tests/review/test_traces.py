@@ -1,6 +1,7 @@
 """Traces: a vehicle that passes a line without a track is noticed, and little else is."""
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -175,16 +176,18 @@ def test_traces_are_in_the_page_the_counts_and_the_findings(
 
 
 def test_a_click_on_a_trace_adds_a_missed_vehicle(tmp_path: Path, run: Invoke) -> None:
-    road = draw_road(tmp_path, _Known.cars[:7], missed=4, seconds=30)
-    page = write_review(run, tmp_path, road)
-    [trace] = read_page(page).data["traces"]
+    cars = [*_Known.cars[:7], Car(20.2, 240, goes_up=False)]
+    page = write_review(run, tmp_path, draw_road(tmp_path, cars, missed=4, seconds=30))
+    [trace], marks = (read_page(page).data[name] for name in ("traces", "marks"))
+    [beside] = (item["moment"] for item in marks if abs(item["seconds"] - trace["time"]) < 2)
+    assert re.findall(r'id="(moment-[^"]*)"', page.read_text("utf-8")) == [beside]
     with browser(tmp_path) as window:
         window.open(page)
-        assert window.run("return document.querySelectorAll('.mark').length") == 7
+        assert window.run("return document.querySelectorAll('.mark').length") == 8
         window.run("document.querySelector('.trace').click()")
         assert window.run(
             "return [document.querySelectorAll('.trace').length, inSpan().length]"
-        ) == [0, 7]
+        ) == [0, 8]
         [added] = window.run("return state.missed")
     assert (added["line"], added["direction"]) == ("gate", "away")
     assert (added["seconds"], added["position"]) == (

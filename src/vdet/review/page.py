@@ -30,7 +30,7 @@ from vdet.review.correcting import correct, covers
 from vdet.review.corrections import MAX_BYTES, Corrections
 from vdet.review.estimate import draw_spans, equal_spans, span_length, strata_of
 from vdet.review.strips import Band, BandPassage, Passages, Sampling, bands_of, sampling_of
-from vdet.review.traces import TraceSearch
+from vdet.review.traces import DELAY, TraceSearch
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span
 from vdet.traffic.counts import Corrected, Counts, Event, Trace, class_of
@@ -102,6 +102,11 @@ def _moment_name(band: int, passage: BandPassage) -> str:
     return f"moment-{band}-{passage.id}-{passage.time:.3f}"
 
 
+def _is_beside(band: int | None, seconds: float, traces: Sequence[Trace]) -> bool:
+    """Return whether there is a trace at a band at about this time."""
+    return any(item.band == band and abs(item.time - seconds) < _BESIDE for item in traces)
+
+
 @dataclass(frozen=True, slots=True)
 class EventMark:
     """A counted event: number of the band, position from 0 to 1, name of the picture of its frame.
@@ -150,8 +155,7 @@ class Review:
             return 1.0 if mark.event.score is None else mark.event.score
 
         def is_doubtful(mark: EventMark) -> bool:
-            traces = (trace for trace in self.traces if trace.band == mark.band)
-            is_beside = any(abs(trace.time - mark.event.time) < _BESIDE for trace in traces)
+            is_beside = _is_beside(mark.band, mark.event.time, self.traces)
             return is_beside or score(mark) < _UNSURE or mark.event in corrected
 
         hours = 1 + int(self.counted.spans[-1][1] // 3600)
@@ -288,13 +292,19 @@ class _Strip:
 class ReviewRecorder:
     """Records the strips of a video while it is read, minute by minute, and the best pictures.
 
-    A context manager: its pictures are temporary files until `write`.
+    A context manager: its pictures are temporary files until `write`. The page opens `corrections`.
     """
 
     def __init__(
-        self, video: VideoInfo, settings: Settings, borders: Sequence[Border], crops: BestCrops
+        self,
+        video: VideoInfo,
+        settings: Settings,
+        borders: Sequence[Border],
+        crops: BestCrops,
+        corrections: Corrections | None,
     ) -> None:
         self._video, self._settings, self._crops = video, settings, crops
+        self._corrections = corrections
         bands = bands_of(borders)
         self._strips = [
             _Strip(band, TraceSearch(number, band), sampling_of(band, ()))
@@ -305,6 +315,7 @@ class ReviewRecorder:
         self._passages = Passages(bands)
         self._folder = tempfile.TemporaryDirectory()
         self._pictures: list[StripPicture] = []
+        self._undecided: list[tuple[int, BandPassage, Image]] = []  # with the number of the band
         self._minute = 0
         self._coding = Coding(full_range=True)  # of strips of images
 
@@ -330,7 +341,7 @@ class ReviewRecorder:
         for number, passages in enumerate(self._passages.by_band):
             self._strips[number].add(frame.time, picture, passages)
             for passage in passages[passed[number] :]:
-                self._write_moment(number, passage, picture.image)
+                self._add_moment(number, passage, picture.image)
         self._write_crops(self._crops.add(selected, picture))
 
     def end(self) -> tuple[Trace, ...]:
@@ -339,20 +350,12 @@ class ReviewRecorder:
         self._write_crops(self._crops.end())
         return tuple(sorted(self._traces, key=lambda trace: trace.time))
 
-    def write(
-        self,
-        path: Path,
-        counted: Counts,
-        counts: Counts,
-        corrections: Corrections | None,
-        index: str,
-    ) -> dict[str, Any]:
+    def write(self, path: Path, counted: Counts, counts: Counts, index: str) -> dict[str, Any]:
         """Write the page, and return what `reviews.html` says of it.
 
-        `counted` are the counts before `corrections`, which the page opens; `index` as for
-        `write_review`.
+        `counted` are the counts before corrections; `index` as for `write_review`.
         """
-        opened = None
+        opened, corrections = None, self._corrections
         if corrections:
             settings = self._settings.model_copy(update={"classes": ()})
             opened = correct({"": counted}, {"": corrections}, settings)[""].corrected
@@ -389,6 +392,7 @@ class ReviewRecorder:
                 self._traces += strip.search.search(self._tracks, rows, passages, is_end=is_end)
             strip.before = [item for item in strip.rows if item[0] >= strip.rows[-1][0] - 1]
             strip.rows = []
+        self._write_beside(is_end=is_end)
         self._tracks = []
 
     def _write_minute(self, number: int, strip: _Strip) -> None:
@@ -432,8 +436,29 @@ class ReviewRecorder:
         for crop in crops:
             (Path(self._folder.name) / crop_name(crop.id)).write_bytes(thumbnail(crop.image))
 
-    def _write_moment(self, number: int, passage: BandPassage, image: Image) -> None:
-        """Write a frame in which a vehicle passes a line, with its box, the line and its path."""
+    def _add_moment(self, number: int, passage: BandPassage, image: Image) -> None:
+        """Write the frame in which a vehicle passes a line, if it will be doubtful.
+
+        A trace beside it is known only later: until then the frame is kept, reduced.
+        """
+        moment = self._moment(number, passage, image)
+        track = next(track for track in self._tracks[-1].tracks if track.id == passage.id)
+        if self._corrections or round(track.score, 4) < _UNSURE:
+            self._write(_moment_name(number, passage), moment)
+        else:
+            self._undecided.append((number, passage, moment))
+
+    def _write_beside(self, *, is_end: bool) -> None:
+        """Write the undecided frames beside traces, and drop those beside which none will come."""
+        undecided, self._undecided = self._undecided, []
+        for number, passage, moment in undecided:
+            if _is_beside(number, passage.time, self._traces):
+                self._write(_moment_name(number, passage), moment)
+            elif not is_end and self._tracks[-1].time - passage.time < DELAY + _BESIDE:
+                self._undecided.append((number, passage, moment))
+
+    def _moment(self, number: int, passage: BandPassage, image: Image) -> Image:
+        """Return the frame, reduced, with the vehicle's box, the line and its path."""
         sides = (side for t in self._tracks[-1].tracks for side in (t.box.width, t.box.height))
         small = self._reduced(image, _MOMENT_WIDTH, largest=max(sides)).copy()
         tracks = [t for item in self._tracks for t in item.tracks if t.id == passage.id]
@@ -444,7 +469,7 @@ class ReviewRecorder:
             boxes.draw_lines(small, [(scale * x, scale * y) for x, y in points], color, 1)
         corners = (scale * side for side in (box.x1, box.y1, box.x2, box.y2))
         boxes.draw_box(small, Box(*corners), boxes.GREEN)
-        self._write(_moment_name(number, passage), small)
+        return small
 
     def _reduced(self, image: Image, width: int, largest: float) -> Image:
         """Return an image of a width at most, as `output.coarse` allows; `largest` is a vehicle."""

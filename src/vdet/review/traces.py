@@ -47,7 +47,7 @@ with them, and 455 without; the traces of a real clip, lower edges of tracked lo
 """
 _GREY = 128
 """Blue and red of grey, levels."""
-_DELAY = 4.0
+DELAY = 4.0
 """Seconds after which a trace is complete."""
 _MANY = 0.05
 """Maximum number of traces for a note instead of a warning, as a fraction of the vehicles."""
@@ -103,7 +103,7 @@ class TraceSearch:
         self._frames += frames
         self._rows += [strip[len(strip) // 2] for strip in strips]
         times = np.array([frame.time for frame in self._frames])
-        until = np.inf if is_end else times[-1] - _DELAY
+        until = np.inf if is_end else times[-1] - DELAY
         ids = _ids(self._band, self._frames)
         for passage in passages:
             if self._searched <= passage.time < until and (ids == passage.id + 1).any():
@@ -119,7 +119,7 @@ class TraceSearch:
                 )
         complete = [trace for trace in traces if self._searched <= trace.time < until]
         self._searched = until
-        first = int(np.searchsorted(times, until - _DELAY))
+        first = int(np.searchsorted(times, until - DELAY))
         self._frames, self._rows = self._frames[first:], self._rows[first:]
         return complete
 

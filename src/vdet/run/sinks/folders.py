@@ -366,8 +366,9 @@ class ReviewSink(BaseSink):
         counter = self.traffic.counter
         assert counter  # the settings have lines or zones
         self._file = context.files.stage_folder(path) / REVIEW_NAME
-        borders = counter.borders
-        self._recorder = ReviewRecorder(self.video, context.settings, borders, context.crops)
+        self._recorder = ReviewRecorder(
+            self.video, context.settings, counter.borders, context.crops, context.corrections
+        )
 
     def __exit__(self, kind: Any, *_: object) -> None:
         with self._recorder:
@@ -390,8 +391,7 @@ class ReviewSink(BaseSink):
         assert counts
         assert counted
         facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
-        given, index = self.context.corrections, _index(self, "review")
-        facts_of_page = self._recorder.write(self._file, counted, counts, given, index)
+        facts_of_page = self._recorder.write(self._file, counted, counts, _index(self, "review"))
         self.summary = {"page": f"{self.path.name}/{REVIEW_NAME}", **facts_of_page}
 
 
