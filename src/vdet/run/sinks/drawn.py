@@ -2,7 +2,8 @@
 
 import zlib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Self
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.schema import Settings
@@ -13,7 +14,7 @@ from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import IMAGE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
-from vdet.run.sinks.protocol import BaseSink, SinkKind
+from vdet.run.sinks.protocol import SinkContext, SinkKind, Writing, sink_function
 from vdet.run.steps import FrameResult
 from vdet.run.threads import write_async
 from vdet.track.track import Track
@@ -110,43 +111,34 @@ def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
     draw_marks(surface, marks)
 
 
-class VideoSink(BaseSink):
-    """Draws on copies of the frames, and encodes them in a thread."""
+@sink_function
+def write_video(path: Path, context: SinkContext) -> Writing:
+    """Draw on copies of the frames, and encode them in a thread."""
+    video, traffic = context.of_video
+    overlay = Overlay(context.settings, video, traffic.counter)
+    used: list[Planes] = []  # allocating memory would take longer than copying into it
+    writer = VideoWriter(
+        context.files.stage(path),
+        video,
+        context.settings.output,
+        name=path,
+        whole_audio=not context.is_part,
+        threads=core_count(),  # more or fewer would write other bytes
+    )
 
-    def __enter__(self) -> Self:
-        context = self.context
-        counter = context.traffic.counter if context.traffic else None
-        self._overlay = Overlay(context.settings, self.video, counter)
-        writer = VideoWriter(
-            context.files.stage(self.path),
-            self.video,
-            context.settings.output,
-            name=self.path,
-            whole_audio=not context.is_part,
-            threads=core_count(),  # more or fewer would write other bytes
-        )
-        self._used: list[Planes] = []  # allocating memory would take longer than copying into it
+    def encode(frame: Frame) -> None:
+        writer.write(frame)
+        if planes := frame.picture.planes:
+            used.append(planes)
 
-        def write(frame: Frame) -> None:
-            writer.write(frame)
-            if planes := frame.picture.planes:
-                self._used.append(planes)
-
-        self._encoding = write_async(write, within=writer)
-        self._encode = self._encoding.__enter__()
-        return self
-
-    def __exit__(self, *raised: Any) -> None:
-        self._encoding.__exit__(*raised)
-
-    def write(self, result: FrameResult) -> None:
-        """Draw the vehicles, and pass the frame to the encoder."""
-        surface = self._overlay.draw(result, self._used.pop() if self._used else None)
-        self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
+    with write_async(encode, within=writer) as put:
+        while result := (yield):
+            surface = overlay.draw(result, used.pop() if used else None)
+            put(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
 VIDEO = SinkKind(
-    VideoSink,
+    write_video,
     VIDEO_SUFFIXES,
     "videos",
     takes="videos",
@@ -155,21 +147,14 @@ VIDEO = SinkKind(
 )
 
 
-class ImageSink(BaseSink):
-    """Writes one image."""
-
-    _is_done = False
-
-    def write(self, result: FrameResult) -> None:
-        """Draw the vehicles, and write the image.
-
-        Raises `OutputError` for a second image.
-        """
-        if self._is_done:
-            raise OutputError(f"{self.path}: is for one image; for several, use a folder")
-        self._is_done = True
-        drawn = Picture(Overlay(self.context.settings, None).draw(result))
-        self.context.files.stage(self.path).write_bytes(encode_image(drawn.image, self.path))
+@sink_function
+def write_image(path: Path, context: SinkContext) -> Writing:
+    """Draw the vehicles on one image, and write it. Raises `OutputError` for a second one."""
+    if result := (yield):
+        drawn = Picture(Overlay(context.settings, None).draw(result))
+        context.files.stage(path).write_bytes(encode_image(drawn.image, path))
+        if (yield):
+            raise OutputError(f"{path}: is for one image; for several, use a folder")
 
 
-IMAGE = SinkKind(ImageSink, sorted(IMAGE_SUFFIXES), "images", takes="images")
+IMAGE = SinkKind(write_image, sorted(IMAGE_SUFFIXES), "images", takes="images")

@@ -6,15 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
 from vdet.config.rendering import render_settings
+from vdet.config.schema import Settings
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
+from vdet.media import VideoInfo
 from vdet.media.demux import is_pipe, plays_in_some_browser
 from vdet.media.images import encode_image, is_image_name
 from vdet.media.writer import can_be_copied, copy_part, encode_part, is_marked
@@ -23,11 +24,10 @@ from vdet.pages.render import PAGE_NAME, REVIEW_NAME, link_to, thumbnail, webp_u
 from vdet.pages.video import Player, VideoPage, longest
 from vdet.regions import Regions
 from vdet.run.sinks.drawn import IMAGE_LABELS
-from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind, Writing, sink_function
 from vdet.run.steps import FINDINGS, FrameResult, findings_in
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock, Span, extend
-from vdet.traffic.live import LiveTraffic
 from vdet.traffic.records import Crop, VehicleRecord
 
 log = logging.getLogger("vdet")
@@ -37,44 +37,42 @@ _GREY = 160, 160, 160
 _CROP_NAME = re.compile(r"vehicle-\d{4,}(-[\w-]+)?-at--?\d+\.\d{3}s\.jpg")
 _GAP = 1.0  # minimum seconds between two frames that the page calls a gap
 _PICTURE_NAME = re.compile(r"vehicle-\d+\.webp")
+_CLIP_NAME = re.compile(
+    r"clip-(\d{2,}|\d{4}-\d\d-\d\dT\d\d)-\d\d-\d\d-[\w-]+-\d+(\+\d+)?\.(mp4|mov|mkv)"
+)
+_PRECISION = 1_000_000  # largest denominator of a time, seconds
 
 
-class StagesSink(BaseSink):
-    """Writes stage images of the first searched frame at or after the time `SinkContext.at`."""
+@sink_function
+def write_stages(path: Path, context: SinkContext) -> Writing:
+    """Write stage images of the first searched frame at or after the time `SinkContext.at`.
 
-    _is_done = False
-
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._tracks: dict[int, Track] = {}
-
-    def finish(self) -> None:
-        """Raise `OutputError` if there is no frame at this time."""
-        if not self._is_done:
-            source = self.context.video.path if self.context.video else self.path
-            at = float(self.context.at)
-            raise OutputError(f"{source}: no frame at {at:.2f} s or later; use an earlier time")
-
-    def write(self, result: FrameResult) -> None:
-        """Write the images if this is the frame."""
-        if self._is_done or not result.searched or result.frame.time < self.context.at:
-            self._tracks.update((track.id, track) for track in result.tracks)
-            return
-        self._is_done = True
-        pictures = self.context.stage_images(result.frame.image, result.detections)
-        height, width = result.frame.image.shape[:2]
-        if self.context.settings.regions:
-            regions = Regions(self.context.settings.regions, width, height)
-            pictures["regions"] = draw_regions(result.frame.image, regions)
-        pictures[_BOXES] = _with_boxes(result)
-        if self.context.video and (result.tracks or self._tracks):
-            pictures["tracks"] = _with_states(result, self._tracks)
-        if result.road:
-            pictures |= stage_images(result.road, result.frame.image)
-        folder = self.context.files.stage_folder(self.path)
-        for number, (name, picture) in enumerate(pictures.items(), start=1):
-            path = folder / f"{number:0{len(str(len(pictures)))}}-{name}.png"  # in order
-            path.write_bytes(encode_image(picture, path))
+    Raises `OutputError` if there is none.
+    """
+    earlier: dict[int, Track] = {}
+    while result := (yield):
+        if result.searched and result.frame.time >= context.at:
+            break
+        earlier.update((track.id, track) for track in result.tracks)
+    else:
+        source, at = context.video.path if context.video else path, float(context.at)
+        raise OutputError(f"{source}: no frame at {at:.2f} s or later; use an earlier time")
+    image = result.frame.image
+    pictures = context.stage_images(image, result.detections)
+    if context.settings.regions:
+        regions = Regions(context.settings.regions, image.shape[1], image.shape[0])
+        pictures["regions"] = draw_regions(image, regions)
+    pictures[_BOXES] = _with_boxes(result)
+    if context.video and (result.tracks or earlier):
+        pictures["tracks"] = _with_states(result, earlier)
+    if result.road:
+        pictures |= stage_images(result.road, image)
+    folder = context.files.stage_folder(path)
+    for number, (name, picture) in enumerate(pictures.items(), start=1):
+        file = folder / f"{number:0{len(str(len(pictures)))}}-{name}.png"  # in order
+        file.write_bytes(encode_image(picture, file))
+    while (yield):
+        pass
 
 
 def _with_boxes(result: FrameResult) -> Image:
@@ -100,36 +98,34 @@ def _with_states(result: FrameResult, earlier: Mapping[int, Track]) -> Image:
     return picture
 
 
-STAGES = SinkKind(StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", uses_traffic=False)
+STAGES = SinkKind(write_stages, what="stages", folder_pattern=f"*-{_BOXES}.png", uses_traffic=False)
 
 
-class CropSink(BaseSink):
-    """Writes the image of a vehicle when it is gone; a better one later replaces it."""
+@sink_function
+def write_crops(path: Path, context: SinkContext) -> Writing:
+    """Write the image of a vehicle when it is gone; a better one later replaces it.
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._folder = context.files.stage_folder(path, _is_crop)
-        self._written: dict[int, tuple[float, Path]] = {}
+    At the end, the images of recorded vehicles get their names.
+    """
+    _, traffic = context.of_video
+    folder = context.files.stage_folder(path, _is_crop)
+    written: dict[int, tuple[float, Path]] = {}
 
-    def finish(self) -> None:
-        """Write the images of vehicles still shown, and name those of all recorded vehicles."""
-        self._write_all(self.context.crops.end())
-        for vehicle in self.traffic.vehicles:
-            if vehicle.id in self._written:
-                time, path = self._written.pop(vehicle.id)
-                path.rename(self._folder / _crop_name(vehicle, time))
-        for _, path in self._written.values():
-            path.unlink()
-
-    def write(self, result: FrameResult) -> None:
-        """Look for better images in a frame."""
-        self._write_all(self.context.crops.add(result.frame_tracks, result.frame.picture))
-
-    def _write_all(self, crops: list[Crop]) -> None:
+    def write(crops: Iterable[Crop]) -> None:
         for crop in crops:
-            path = self._folder / f"{crop.id}.jpg"
-            path.write_bytes(encode_image(crop.image, path))
-            self._written[crop.id] = crop.time, path
+            file = folder / f"{crop.id}.jpg"
+            file.write_bytes(encode_image(crop.image, file))
+            written[crop.id] = crop.time, file
+
+    while result := (yield):
+        write(context.crops.add(result.frame_tracks, result.frame.picture))
+    write(context.crops.end())
+    for vehicle in traffic.vehicles:
+        if vehicle.id in written:
+            time, file = written.pop(vehicle.id)
+            file.rename(folder / _crop_name(vehicle, time))
+    for _, file in written.values():
+        file.unlink()
 
 
 def _is_crop(path: Path) -> bool:
@@ -143,102 +139,84 @@ def _crop_name(vehicle: VehicleRecord, time: float) -> str:
 
 
 CROPS = SinkKind(
-    CropSink, what="images of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
+    write_crops, what="images of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
 )
 
 
-class PageSink(BaseSink):
-    """Collects what the page shows, and writes it at the end."""
+@sink_function
+def write_page(path: Path, context: SinkContext) -> Writing:
+    """Collect what the page shows, and write it at the end."""
+    video, traffic = context.of_video
+    folder = context.files.stage_folder(path, _is_picture)
+    pictures, spans, frames = dict[int, Path](), list[Span](), 0
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._folder = context.files.stage_folder(path, _is_picture)
-        self._pictures: dict[int, Path] = {}
-        self._spans: list[Span] = []
-        self._frames = 0
-
-    def finish(self) -> None:
-        """Write the page."""
-        self._keep(self.context.crops.end())
-        for number in self._pictures.keys() - {vehicle.id for vehicle in self.traffic.vehicles}:
-            self._pictures.pop(number).unlink()
-        page = self._page()
-        self.summary = {"page": f"{self.path.name}/{PAGE_NAME}", **page.summary}
-        write_text(self._folder / PAGE_NAME, page.html())
-
-    def write(self, result: FrameResult) -> None:
-        """Add a frame."""
-        frame, picture = result.frame_tracks, result.frame.picture
-        extend(self._spans, frame.time, _GAP)
-        self._frames += 1
-        self.context.poster.add(result)
-        self._keep(self.context.crops.add(frame, picture))
-
-    def _keep(self, crops: list[Crop]) -> None:
+    def keep(crops: Iterable[Crop]) -> None:
         for crop in crops:
-            self._pictures[crop.id] = self._folder / f"vehicle-{crop.id}.webp"
-            self._pictures[crop.id].write_bytes(thumbnail(crop.image))
+            pictures[crop.id] = folder / f"vehicle-{crop.id}.webp"
+            pictures[crop.id].write_bytes(thumbnail(crop.image))
 
-    def _page(self) -> VideoPage:
-        settings, traffic = self.context.settings, self.traffic
-        review, poster = self.context.path_of("review"), self.context.poster.image(traffic.vehicles)
-        return VideoPage(
-            video=self.video,
-            frames=self._frames,
-            spans=self._spans or [(0.0, 0.0)],
-            records=traffic.vehicles,
-            thumbnails={
-                record.id: webp_uri(self._pictures[record.id].read_bytes())
-                for record in longest(traffic.vehicles)
-                if record.id in self._pictures
-            },
-            poster=poster,
-            still=self.context.poster.with_boxes(poster),
-            player=self._player(),
-            settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
-            survey=self.context.survey,
-            interval=settings.traffic.seconds or 60,
-            clock=traffic.clock,
-            pictures={number: path.name for number, path in self._pictures.items()},
-            findings=findings_in(self.context.facts).items,
-            clips={n: link_to(path, self.path) for n, path in self.context.clip_files.items()},
-            review=link_to(review / REVIEW_NAME, self.path) if review else "",
-            index=_index(self, "page"),
-        )
+    while result := (yield):
+        extend(spans, result.frame_tracks.time, _GAP)
+        frames += 1
+        context.poster.add(result)
+        keep(context.crops.add(result.frame_tracks, result.frame.picture))
+    keep(context.crops.end())
+    for number in pictures.keys() - {vehicle.id for vehicle in traffic.vehicles}:
+        pictures.pop(number).unlink()
+    settings, review = context.settings, context.path_of("review")
+    poster = context.poster.image(traffic.vehicles)
+    page = VideoPage(
+        video=video,
+        frames=frames,
+        spans=spans or [(0.0, 0.0)],
+        records=traffic.vehicles,
+        thumbnails={
+            record.id: webp_uri(pictures[record.id].read_bytes())
+            for record in longest(traffic.vehicles)
+            if record.id in pictures
+        },
+        poster=poster,
+        still=context.poster.with_boxes(poster),
+        player=_player(path, context, spans),
+        settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
+        survey=context.survey,
+        interval=settings.traffic.seconds or 60,
+        clock=traffic.clock,
+        pictures={number: picture.name for number, picture in pictures.items()},
+        findings=findings_in(context.facts).items,
+        clips={number: link_to(clip, path) for number, clip in context.clip_files.items()},
+        review=link_to(review / REVIEW_NAME, path) if review else "",
+        index=_index(path, context, "page"),
+    )
+    write_text(folder / PAGE_NAME, page.html())
+    return {"page": f"{path.name}/{PAGE_NAME}", **page.summary}
 
-    def _player(self) -> Player | None:
-        """Return the video that this run writes, else the source if a browser plays it."""
-        source = self.video.path
-        drawn = self.context.path_of("video")
-        is_file = source.is_file() and not is_image_name(source)
-        if not drawn and not (is_file and plays_in_some_browser(source)):
-            return None
-        path, start = source, 0.0
-        if drawn:
-            path, start = drawn, self._spans[0][0] if self._spans else start
-        return Player(path.name, link_to(path, self.path), bool(drawn), start)
+
+def _player(path: Path, context: SinkContext, spans: Sequence[Span]) -> Player | None:
+    """Return the video that this run writes, else the source if a browser plays it."""
+    video, _ = context.of_video
+    if drawn := context.path_of("video"):
+        return Player(drawn.name, link_to(drawn, path), True, spans[0][0] if spans else 0.0)
+    is_file = video.path.is_file() and not is_image_name(video.path)
+    if not (is_file and plays_in_some_browser(video.path)):
+        return None
+    return Player(video.path.name, link_to(video.path, path), False, 0.0)
 
 
 def _is_picture(path: Path) -> bool:
     return _PICTURE_NAME.fullmatch(path.name) is not None
 
 
-def _index(sink: BaseSink, name: str) -> str:
+def _index(path: Path, context: SinkContext, name: str) -> str:
     """Return the address of the file over all videos of the batch for pages; empty without one."""
-    path = sink.context.path_of(name, in_batch=True)
-    return link_to(path, sink.path) if path else ""
+    index = context.path_of(name, in_batch=True)
+    return link_to(index, path) if index else ""
 
 
 _INDEX = BatchTotal("index", write_index, ".html", of_failed=lambda error: {"error": error})
 PAGE = SinkKind(
-    PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX, finish_order=1
+    write_page, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX, finish_order=1
 )
-
-
-_CLIP_NAME = re.compile(
-    r"clip-(\d{2,}|\d{4}-\d\d-\d\dT\d\d)-\d\d-\d\d-[\w-]+-\d+(\+\d+)?\.(mp4|mov|mkv)"
-)
-_PRECISION = 1_000_000  # largest denominator of a time, seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,13 +237,6 @@ class ClipSpan:
         return f"clip-{moment}-{in_file_name(first.class_name)}-{first.id}{more}"
 
 
-def counted_vehicles(traffic: LiveTraffic) -> Sequence[VehicleRecord]:
-    """Return the vehicles that were counted; all without lines and zones."""
-    counts = traffic.counts()
-    counted = {event.id for event in counts.events} if counts else ()
-    return [record for record in traffic.vehicles if counts is None or record.id in counted]
-
-
 def scenes(records: Iterable[VehicleRecord], margin: float) -> list[ClipSpan]:
     """Return the time spans of vehicles with margins, seconds; spans that touch are joined."""
     found: list[ClipSpan] = []
@@ -279,56 +250,62 @@ def scenes(records: Iterable[VehicleRecord], margin: float) -> list[ClipSpan]:
     return found
 
 
-class ClipSink(BaseSink):
-    """Cuts the clips at the end of the run; with lines or zones, only of counted vehicles.
+@sink_function
+def write_clips(path: Path, context: SinkContext) -> Writing:
+    """Cut the clips at the end of the run; with lines or zones, only of counted vehicles.
 
-    The video is read a second time: if it is no longer the same file then, there are no clips.
+    The video is read a second time: if it is no longer the same file then, there are no clips. One
+    that cannot be cut is left out, with a warning.
     """
+    video, traffic = context.of_video
+    source, settings = video.path, context.settings
+    if is_pipe(source):
+        what = "can be read only once, so no clips can be cut out of it"
+        raise OutputError(f"{source}: {what}; save it to a file first")
+    state = _state(source)
+    is_copied = not settings.clips.exact and can_be_copied(source)
+    while (yield):
+        pass
+    folder = context.files.stage_folder(path, is_clip)
+    if _state(source) != state:
+        log.warning("%s: changed during the run, so no clips were cut out of it", source)
+        return
+    counts = traffic.counts()
+    counted = {event.id for event in counts.events} if counts else ()
+    shown = (item for item in traffic.vehicles if counts is None or item.id in counted)
+    for scene in scenes(shown, settings.clips.margin):
+        clip = path / f"{scene.name(traffic.clock)}.mp4"
+        try:
+            _cut(scene, video, clip, folder / clip.name, settings, is_copied=is_copied)
+            context.clip_files.update(dict.fromkeys((item.id for item in scene.vehicles), clip))
+        except (OutputError, VideoError) as error:
+            if isinstance(error.__cause__, OSError):  # such as a full disk
+                raise
+            (folder / clip.name).unlink(missing_ok=True)
+            log.warning("%s: the clip %s was not written: %s", source, clip.stem, error)
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        if is_pipe(self.video.path):
-            what = "can be read only once, so no clips can be cut out of it"
-            raise OutputError(f"{self.video.path}: {what}; save it to a file first")
-        self._state = _state(self.video.path)
-        is_exact = context.settings.clips.exact
-        self._is_copied = not is_exact and can_be_copied(self.video.path)
 
-    def finish(self) -> None:
-        """Write the clips. One that cannot be cut is left out, with a warning."""
-        folder = self.context.files.stage_folder(self.path, is_clip)
-        source = self.video.path
-        if _state(source) != self._state:
-            log.warning("%s: changed during the run, so no clips were cut out of it", source)
+def _cut(
+    scene: ClipSpan,
+    video: VideoInfo,
+    clip: Path,
+    target: Path,
+    settings: Settings,
+    *,
+    is_copied: bool,
+) -> None:
+    """Copy or encode a scene into `target`, later `clip`; what cannot be copied is encoded."""
+    sides = (scene.start, scene.end)
+    start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
+    end += 1 / video.rate / 2  # the frame at the end is shown too
+    if is_copied:
+        try:
+            copy_part(video.path, video.start + start, video.start + end, target)
             return
-        for scene in scenes(counted_vehicles(self.traffic), self.context.settings.clips.margin):
-            name = scene.name(self.traffic.clock)
-            try:
-                clip = self._cut(scene, folder / name)
-                files = dict.fromkeys((item.id for item in scene.vehicles), self.path / clip.name)
-                self.context.clip_files.update(files)
-            except (OutputError, VideoError) as error:
-                if isinstance(error.__cause__, OSError):  # such as a full disk
-                    raise
-                (folder / f"{name}.mp4").unlink(missing_ok=True)
-                log.warning("%s: the clip %s was not written: %s", source, name, error)
-
-    def _cut(self, scene: ClipSpan, stem: Path) -> Path:
-        """Copy or encode a scene, and return its file; a part that cannot be copied is encoded."""
-        video, sides = self.video, (scene.start, scene.end)
-        start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
-        end += 1 / video.rate / 2  # the frame at the end is shown too
-        target = stem.with_name(f"{stem.name}.mp4")
-        if self._is_copied:
-            try:
-                copy_part(video.path, video.start + start, video.start + end, target)
-                return target
-            except OutputError as error:
-                target.unlink(missing_ok=True)
-                log.debug("%s; encoded instead", error)
-        name, first = self.path / target.name, max(start, Fraction(0))
-        encode_part(video.path, first, end, target, self.context.settings, name=name)
-        return target
+        except OutputError as error:
+            target.unlink(missing_ok=True)
+            log.debug("%s; encoded instead", error)
+    encode_part(video.path, max(start, Fraction(0)), end, target, settings, name=clip)
 
 
 def is_clip(path: Path) -> bool:
@@ -350,54 +327,44 @@ def _state(path: Path) -> tuple[int, int, int, int] | None:
 
 
 CLIPS = SinkKind(
-    ClipSink, what="clips", folder_pattern="clip-*.*", takes="videos", may_replace=_may_replace
+    write_clips, what="clips", folder_pattern="clip-*.*", takes="videos", may_replace=_may_replace
 )
 
 
-class ReviewSink(BaseSink):
-    """Writes the page on which the counts are checked."""
+@sink_function
+def write_review(path: Path, context: SinkContext) -> Writing:
+    """Write the page on which the counts are checked.
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        if not context.settings.traffic:
-            raise OutputError(f"{path}: no lines or zones to review; add them to the settings")
-        from vdet.review.page import ReviewRecorder  # most runs load nothing of it
+    At the end, add the traces to the counts, and the findings about them.
+    """
+    if not context.settings.traffic:
+        raise OutputError(f"{path}: no lines or zones to review; add them to the settings")
+    from vdet.review.page import ReviewRecorder  # most runs load nothing of it
+    from vdet.review.traces import with_traces
 
-        counter = self.traffic.counter
-        assert counter  # the settings have lines or zones
-        self._file = context.files.stage_folder(path) / REVIEW_NAME
-        self._recorder = ReviewRecorder(
-            self.video, context.settings, counter.borders, context.crops, context.corrections
-        )
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        with self._recorder:
-            super().__exit__(kind)
-
-    def write(self, result: FrameResult) -> None:
-        """Add a frame to all strips."""
-        frame = replace(result.frame_tracks, tracks=(*result.tracks, *result.unselected))
-        self._recorder.add(frame, result.frame_tracks, result.frame.picture)
-
-    def finish(self) -> None:
-        """Write the page, and add the traces to the counts, and the findings about them."""
-        from vdet.review.traces import with_traces
-
-        traffic, facts = self.traffic, self.context.facts
+    (video, traffic), facts = context.of_video, context.facts
+    assert traffic.counter  # the settings have lines or zones
+    file, borders = context.files.stage_folder(path) / REVIEW_NAME, traffic.counter.borders
+    with ReviewRecorder(
+        video, context.settings, borders, context.crops, context.corrections
+    ) as recorder:
+        while result := (yield):
+            frame = replace(result.frame_tracks, tracks=(*result.tracks, *result.unselected))
+            recorder.add(frame, result.frame_tracks, result.frame.picture)
         counts = traffic.counts()
         assert counts
-        traffic.revise(with_traces(counts, self._recorder.end()))
+        traffic.revise(with_traces(counts, recorder.end()))
         counts, counted = traffic.counts(), traffic.counted
         assert counts
         assert counted
         facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
-        facts_of_page = self._recorder.write(self._file, counted, counts, _index(self, "review"))
-        self.summary = {"page": f"{self.path.name}/{REVIEW_NAME}", **facts_of_page}
+        facts_of_page = recorder.write(file, counted, counts, _index(path, context, "review"))
+    return {"page": f"{path.name}/{REVIEW_NAME}", **facts_of_page}
 
 
 _LIST = BatchTotal("reviews", write_reviews, ".html", of_failed=lambda error: {"error": error})
 REVIEW = SinkKind(
-    ReviewSink,
+    write_review,
     what="reviews",
     folder_pattern=REVIEW_NAME,
     takes="videos",

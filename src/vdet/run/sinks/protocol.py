@@ -1,31 +1,43 @@
 """The protocol of outputs (sinks), their kinds, and how outputs are checked and opened."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, Self
 
+import cv2
+import numpy as np
+
+from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.detect.detectors import StageImages
 from vdet.errors import OutputError
 from vdet.files import OutputFiles, output_errors
 from vdet.media import VideoInfo
+from vdet.media.images import coarse_scale, shrunk
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.sinks import Output
 from vdet.run.steps import Fact, FrameResult
 
 if TYPE_CHECKING:  # an image needs no traffic: a tenth of the time of `detect-image`
     from vdet.review.corrections import Corrections
-    from vdet.run.sinks.poster import Poster
     from vdet.traffic.live import LiveTraffic
-    from vdet.traffic.records import BestCrops
+    from vdet.traffic.records import BestCrops, VehicleRecord
     from vdet.traffic.survey import Survey
 
+P = ParamSpec("P")
+
 STANDARD_OUTPUT = Path("-")
+
+Writing = Generator[None, FrameResult | None, Any]
+"""What a `sink_function` does: it receives results until None, when the run ends without an error.
+
+It returns the `summary` of the output: see `BaseSink`.
+"""
 
 
 class Sink(AbstractContextManager["Sink"], Protocol):
@@ -98,11 +110,16 @@ class SinkContext:
         outputs = self.totals if in_batch else self.outputs
         return next((output.path for output in outputs if output.sink == sink), None)
 
+    @property
+    def of_video(self) -> tuple[VideoInfo, "LiveTraffic"]:
+        """The video and its traffic, for sinks that do not accept images."""
+        assert self.video is not None  # `SinkKind.takes` says so
+        assert self.traffic is not None
+        return self.video, self.traffic
+
     @cached_property
     def poster(self) -> "Poster":
         """The frame with the most vehicles; sinks that use it add each result."""
-        from vdet.run.sinks.poster import Poster
-
         return Poster(is_coarse=self.settings.output.coarse)
 
     @cached_property
@@ -121,8 +138,47 @@ class SinkContext:
         return Survey({self.video.name: counts}, self.settings) if counts and self.video else None
 
 
+class Poster:
+    """The frame that pages and workbooks show: the one with the most vehicles.
+
+    `is_coarse` is `output.coarse`.
+    """
+
+    def __init__(self, *, is_coarse: bool) -> None:
+        self._is_coarse = is_coarse
+        self._best: FrameResult | None = None
+
+    def add(self, result: FrameResult) -> None:
+        """Add a frame."""
+        if self._best is None or len(result.tracks) > len(self._best.tracks):
+            self._best = result
+
+    def image(self, vehicles: Iterable["VehicleRecord"]) -> Image | None:
+        """Return the frame, BGR uint8, at its own size; None without frames.
+
+        `vehicles` are all of the video: no detail is kept that would show their plates.
+        """
+        if self._best is None:
+            return None
+        image, boxes = self._best.frame.image, [vehicle.largest for vehicle in vehicles]
+        if not self._is_coarse:
+            return image
+        height, width = image.shape[:2]
+        largest = max((side for box in boxes for side in (box.width, box.height)), default=0)
+        reduced = shrunk(image, coarse_scale(largest, height))
+        return np.asarray(cv2.resize(reduced, (width, height)), np.uint8)  # marks are drawn on it
+
+    def with_boxes(self, image: Image | None) -> Image | None:
+        """Return a copy of the frame, as `image` returns it, with a box around each vehicle."""
+        if self._best is None or image is None:
+            return None
+        drawn = image.copy()
+        self._best.draw_tracks(drawn, ())
+        return drawn
+
+
 class BaseSink:
-    """Base of most sinks: `finish` is called when the run ends without an error.
+    """Base of sinks that are classes: `finish` is called when the run ends without an error.
 
     `summary` is what a file over all videos of a batch needs from the output, as values for JSON.
     """
@@ -136,14 +192,12 @@ class BaseSink:
     @property
     def video(self) -> VideoInfo:
         """The video, for sinks that do not accept images."""
-        assert self.context.video is not None  # `SinkKind.takes` says so
-        return self.context.video
+        return self.context.of_video[0]
 
     @property
     def traffic(self) -> "LiveTraffic":
         """Counts, speeds and records of the video, for sinks that do not accept images."""
-        assert self.context.traffic is not None  # as for `video`
-        return self.context.traffic
+        return self.context.of_video[1]
 
     def __enter__(self) -> Self:
         return self
@@ -157,6 +211,40 @@ class BaseSink:
 
     def finish(self) -> None:
         """Write everything that is left."""
+
+
+class _FunctionSink:
+    """A sink that is a function: see `Writing`."""
+
+    summary: Any = None
+
+    def __init__(self, writing: Writing) -> None:
+        self._writing = writing
+
+    def __enter__(self) -> Self:
+        next(self._writing)
+        return self
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        if kind is not None:
+            return self._writing.close()
+        try:
+            self._writing.send(None)
+        except StopIteration as end:
+            self.summary = end.value
+
+    def write(self, result: FrameResult) -> None:
+        self._writing.send(result)
+
+
+def sink_function(function: Callable[P, Writing]) -> Callable[P, Sink]:
+    """Return what opens the sink that a generator function describes."""
+
+    @wraps(function)
+    def open_sink(*arguments: P.args, **named: P.kwargs) -> Sink:
+        return _FunctionSink(function(*arguments, **named))
+
+    return open_sink
 
 
 @dataclass(frozen=True, slots=True)
