@@ -45,7 +45,7 @@ from vdet.run.images import input_files
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.sinks.folders import is_clip
-from vdet.run.sinks.protocol import BatchTotal, check_sinks, output_state, sink_kind
+from vdet.run.sinks.protocol import check_sinks, output_state, sink_kind
 from vdet.run.steps import FINDINGS
 from vdet.run.video import Run, write_outputs
 from vdet.version import __version__
@@ -479,30 +479,17 @@ _KILLED = "{}: its process was killed or crashed; it may have run out of memory"
 
 
 @dataclass(frozen=True, slots=True)
-class TotalFile:
-    """A file over all videos.
-
-    `kind` writes it to `path`, from the outputs at position `output_number` in every run, whose
-    names have this `ending` after that of the video.
-    """
-
-    path: Path
-    kind: BatchTotal
-    output_number: int
-    ending: str
-
-
-@dataclass(frozen=True, slots=True)
 class Plan:
     """The runs to process and those to skip; all their outputs are in `folder`.
 
-    `doubtful` of those to skip may have wrong results, by their records.
+    `common` is what they have in common; its outputs are the endings of theirs. `doubtful` of those
+    to skip may have wrong results, by their records.
     """
 
     folder: Path
+    common: Run
     runs: tuple[Run, ...]
     skipped: tuple[Run, ...]
-    totals: tuple[TotalFile, ...]
     doubtful: int = 0
 
 
@@ -539,16 +526,10 @@ def make_plan(
     sources = find_sources(clips)
     _reject_nested(clips, sources, folder)
     settings_files = tuple(path.absolute() for path in common.settings_files)
-    totals = tuple(
-        TotalFile(folder / f"{kind.name}{kind.suffix or ending}", kind, number, ending)
-        for number, output in enumerate(common.outputs)
-        for ending in [output.path.name]
-        if (kind := sink_kind(output.sink).total)
-    )
-    linked = tuple(Output(common.outputs[total.output_number].sink, total.path) for total in totals)
-    common = replace(common, settings=settings, settings_files=settings_files, totals=linked)
+    outputs = tuple(_with_total(output, folder) for output in common.outputs)
+    common = replace(common, settings=settings, settings_files=settings_files, outputs=outputs)
     runs = [_run_of(source, folder, common) for source in sources]
-    _reject_shared(runs, totals, folder)
+    _reject_shared(runs, outputs, folder)
     videos = (source.path for source in sources)
     inputs = input_files(*videos, *settings_files, settings=settings)
     manifest, skipped, doubtful = folder / MANIFEST, list[Run](), 0
@@ -570,9 +551,17 @@ def make_plan(
         _check_outputs(run, inputs)
     replaces_totals = common.overwrite or (skip_existing and manifest.exists())
     total_files = OutputFiles(overwrite=replaces_totals, inputs=inputs)
-    for total in totals:
-        total_files.check(total.path, makes_folder=True)
-    return Plan(folder, tuple(runs), tuple(skipped), totals, doubtful)
+    for output in outputs:
+        if output.total:
+            total_files.check(output.total, makes_folder=True)
+    return Plan(folder, common, tuple(runs), tuple(skipped), doubtful)
+
+
+def _with_total(output: Output, folder: Path) -> Output:
+    """Return an output, whose path is an ending, with the file over all videos, if it has one."""
+    total = sink_kind(output.sink).total
+    path = total and folder / f"{total.name}{total.suffix or output.path.name}"
+    return replace(output, total=path)
 
 
 def _run_of(source: InputVideo, folder: Path, common: Run) -> Run:
@@ -604,10 +593,10 @@ def _reject_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
             raise BatchError(f"{source.path}: is inside the output folder {folder}; use another")
 
 
-def _reject_shared(runs: Iterable[Run], totals: Iterable[TotalFile], folder: Path) -> None:
+def _reject_shared(runs: Iterable[Run], endings: Iterable[Output], folder: Path) -> None:
     """Reject an output with the name of another output, a total or the manifest."""
     owners = {folder / MANIFEST: "the manifest"}
-    makers = [(total.path, f"the table of all {total.ending}") for total in totals]
+    makers = [(item.total, f"the table of all {item.path}") for item in endings if item.total]
     makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
     for path, maker in makers:
         if path in owners:
@@ -658,19 +647,21 @@ def _write_totals(plan: Plan, errors: Mapping[Path, str | None]) -> None:
 
     `errors` are those of this batch, by the first output of each run.
     """
-    if not plan.totals:
+    if not any(output.total for output in plan.common.outputs):
         return
     written = outputs_by_path(read_batch(plan.folder))
     runs = sorted((*plan.runs, *plan.skipped), key=lambda run: run.outputs[0].path)
-    for total in plan.totals:
-        summaries = {}
+    for number, output in enumerate(plan.common.outputs):
+        kind, summaries = sink_kind(output.sink).total, {}
+        if not (kind and output.total):
+            continue
         for run in runs:
-            path, error = run.outputs[total.output_number].path, errors.get(run.outputs[0].path)
-            name = path.relative_to(plan.folder).as_posix().removesuffix(total.ending)
+            path, error = run.outputs[number].path, errors.get(run.outputs[0].path)
+            name = path.relative_to(plan.folder).as_posix().removesuffix(output.path.name)
             versions = written.get(os.path.realpath(path))
-            if error and total.kind.of_failed:
-                summaries[name] = total.kind.of_failed(error)
+            if error and kind.of_failed:
+                summaries[name] = kind.of_failed(error)
             elif versions and os.path.exists(path):  # noqa: PTH110  # too long a name
                 summaries[name] = versions[-1].summary
-        with OutputFiles(overwrite=True) as files, output_errors(total.path):
-            total.kind.write(summaries, files.stage(total.path))
+        with OutputFiles(overwrite=True) as files, output_errors(output.total):
+            kind.write(summaries, files.stage(output.total))

@@ -97,8 +97,7 @@ def draw(
     """
     from vdet.config.loading import given_values
     from vdet.pages.drawing import Drawing
-    from vdet.run.scene import read_scene
-    from vdet.run.video import Run
+    from vdet.run.video import Run, read_scene
 
     settings = source.load()
     inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)

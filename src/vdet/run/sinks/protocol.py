@@ -70,8 +70,6 @@ class SinkContext:
         `Run.at`: seconds from the first frame.
     outputs
         All outputs of the run, for a sink that refers to another.
-    totals
-        `Run.totals`: the files over all videos of its batch.
     traffic
         Counts and speeds up to the latest result, and the records of vehicles, which are known when
         sinks finish; None for single images.
@@ -97,7 +95,6 @@ class SinkContext:
     end: Fraction | None = None
     at: Fraction = Fraction(0)
     outputs: tuple[Output, ...] = ()
-    totals: tuple[Output, ...] = ()
     traffic: "LiveTraffic | None" = None
     corrections: "Corrections | None" = None
     facts: dict[str, Fact] = field(default_factory=dict)
@@ -107,8 +104,8 @@ class SinkContext:
 
     def path_of(self, sink: str, *, in_batch: bool = False) -> Path | None:
         """Return the output of a sink, or its file over all videos of the batch."""
-        outputs = self.totals if in_batch else self.outputs
-        return next((output.path for output in outputs if output.sink == sink), None)
+        outputs = (output for output in self.outputs if output.sink == sink)
+        return next((output.total if in_batch else output.path for output in outputs), None)
 
     @property
     def of_video(self) -> tuple[VideoInfo, "LiveTraffic"]:
