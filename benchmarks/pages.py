@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from vdet.pages.batch import write_index
 from vdet.pages.render import jpeg_uri
+from vdet.pages.video import write_index
 
 CLASSES = ("car", "car", "car", "truck", "bus", "motorcycle")
 FILTERS = {"class": "2", "video": "clip012", "seconds-min": "5", "from": "2026-05-04T10:00"}

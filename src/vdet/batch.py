@@ -560,8 +560,8 @@ def make_plan(
 def _with_total(output: Output, folder: Path) -> Output:
     """Return an output, whose path is an ending, with the file over all videos, if it has one."""
     total = sink_kind(output.sink).total
-    path = total and folder / f"{total.name}{total.suffix or output.path.name}"
-    return replace(output, total=path)
+    name = total and f"{total.name}{total.suffix or output.path.name}"
+    return replace(output, total=folder / name if name else None)
 
 
 def _run_of(source: InputVideo, folder: Path, common: Run) -> Run:

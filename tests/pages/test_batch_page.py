@@ -8,7 +8,7 @@ import pytest
 
 from browser import browser
 from pages.html import Elements, needs_chromium, title_in_chromium
-from vdet.pages.batch import NO_STILL, Row, write_index
+from vdet.pages.video import NO_STILL, Row, write_index
 
 NASTY = "</script><b>"
 

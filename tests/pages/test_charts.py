@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.errors import clock_text
-from vdet.pages import charts
-from vdet.pages.charts import interval_plot, number_axis, time_axis, time_text
+from vdet.pages.render import interval_plot, number_axis, pack_rows, time_axis, time_text
 from vdet.traffic.clock import Clock
 
 
@@ -76,7 +75,7 @@ def test_a_time_axis_may_show_the_time_of_the_day() -> None:
 def test_no_two_spans_at_one_time_share_a_row_and_no_row_is_needless(
     spans: Sequence[tuple[int, int]],
 ) -> None:
-    rows = charts.pack_rows(spans)
+    rows = pack_rows(spans)
     at_once = [[row for row, (a, b) in zip(rows, spans, strict=True) if a <= time <= b]
                for time in range(121)]  # fmt: skip
     assert all(len(set(item)) == len(item) for item in at_once)

@@ -18,8 +18,7 @@ from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
 from vdet.errors import ConfigError, clock_text
 from vdet.media.images import read_image
-from vdet.pages.charts import Plot, interval_plot, time_axis
-from vdet.pages.render import Table, render
+from vdet.pages.render import Plot, Table, interval_plot, render, time_axis
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, EventGroups
 from vdet.traffic.crossings import Border, Line, lines_and_zones

@@ -1,33 +1,68 @@
-"""The page of a video: which vehicles appear, when, where, and their images."""
+"""The page of a video: which vehicles appear, when, where, and their images; pages over many."""
 
+import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN
+from vdet.config.rendering import render_settings
+from vdet.config.schema import Settings
 from vdet.draw.boxes import color_of, text_color
 from vdet.errors import plural
+from vdet.files import write_text
 from vdet.findings import Finding
 from vdet.media import VideoInfo
-from vdet.pages import charts
-from vdet.pages.batch import NO_STILL, Row, VideoRows, table_json
-from vdet.pages.charts import Axis, Plot, TimelineBar, ToClock, hex_color, interval_plot
-from vdet.pages.render import jpeg_uri, render
+from vdet.pages.render import (
+    PAGE_NAME,
+    Axis,
+    Bar,
+    Plot,
+    ToClock,
+    hex_color,
+    interval_plot,
+    jpeg_uri,
+    link_to,
+    pack_rows,
+    render,
+    time_axis,
+    time_text,
+)
 from vdet.pages.traffic import page_table, path_marks, scene_picture, with_marks
 from vdet.traffic.clock import Clock, Intervals, Span
 from vdet.traffic.counts import Counts
 from vdet.traffic.records import COLUMNS, VehicleRecord
 from vdet.traffic.survey import Survey
 
+_INTERVAL = 60  # seconds of an interval of the charts, unless the settings have one
 _MAX_VEHICLES = 300  # in the timeline, and with pictures
 _DOUBT = "#f3d9a4", "#333"  # colours of the row with doubtful times
 _STOOD = {"standing": "standing", "unknown": "not seen moving"}
 _SIDES = "left", "middle", "right"
 _NEAR = 0.1  # width of a near vehicle, as a fraction of the frame's
 _SMALL = 200  # longer side of the thumbnail on the page over many videos
+NO_STILL = "data:image/jpeg;base64,"
+"""Thumbnail of a video without a frame."""
+_COLUMNS = (
+    *("id", "first", "seconds", "speed", "lines", "motion", "distance", "lane"),
+    *("side", "size", "certainty"),
+)
+_EMPTY = (None, "")
+Row = Mapping[str, Any]
+"""A vehicle in the table of a video or of a batch.
+
+Its columns are those of records, and `class_name`; `lines`, the lines and zones where it was
+counted, in order; `side` and `size`, where its largest box is in the picture; `certainty`, "sure"
+if `VehicleRecord.is_sure`, else "unsure"; `picture` and `clip`, their addresses relative to the
+page of its video. Unknown values are None or empty.
+"""
+Summaries = Mapping[str, Mapping[str, Any]]
+"""The `summary` of an output of each video, by its name; `page` is relative to its folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +102,8 @@ class VideoPage:
     poster, still
         The frame with the most vehicles, BGR uint8, and a copy with their boxes; None without
         frames.
-    settings
-        The settings of the run as YAML.
     survey
         The counts; None if nothing is counted.
-    interval
-        Interval of the counts over time, seconds.
     clock
         Start time of the video; None if unknown.
     pictures
@@ -95,9 +126,8 @@ class VideoPage:
     poster: Image | None
     still: Image | None
     player: Player | None
-    settings: str
+    settings: Settings
     survey: Survey | None = None
-    interval: int = 60
     clock: Clock | None = None
     pictures: Mapping[int, str] = field(default_factory=dict)
     findings: Sequence[Finding] = ()
@@ -114,8 +144,7 @@ class VideoPage:
     def summary(self) -> dict[str, Any]:
         """What the page over many videos shows of this one, as values for JSON."""
         return {
-            "plays": self.player is not None,
-            "start": self.player.start if self.player else 0.0,
+            **self._table(self.pictures),
             "seconds": max(0.0, self.seconds),
             "frames": self.frames,
             "vehicles": len(self._moved),
@@ -123,7 +152,6 @@ class VideoPage:
             "still": NO_STILL if self.still is None else jpeg_uri(self.still, _SMALL),
             "counts": self._totals,
             "conditions": [item.text for item in self.findings if item.severity == "warning"],
-            "rows": self._rows(self.pictures),
             "review": self.review,
         }
 
@@ -136,7 +164,7 @@ class VideoPage:
     def _max_at_once(self) -> int:
         """The maximum number of vehicles at once."""
         spans = sorted((record.first, record.last) for record in self.records)
-        return 1 + max(charts.pack_rows(spans), default=-1)
+        return 1 + max(pack_rows(spans), default=-1)
 
     @property
     def _totals(self) -> dict[str, int]:
@@ -144,12 +172,12 @@ class VideoPage:
         totals = self.counts.totals if self.counts else ()
         return {f"{total.name}: {total.direction}": total.count for total in totals if total.count}
 
-    def _rows(self, pictures: Mapping[int, str]) -> list[Row]:
-        """Return the rows of the table; `pictures` has addresses of images by vehicle id."""
+    def _table(self, pictures: Mapping[int, str]) -> dict[str, Any]:
+        """Return what the table needs; `pictures` has addresses of images by vehicle id."""
         lines: dict[int, dict[str, None]] = {}
         for event in self.counts.events if self.counts else ():
             lines.setdefault(event.id, {})[event.name] = None
-        return [
+        rows = [
             {
                 **{name: COLUMNS[name](record) for name in ("id", "speed", "distance", "lane")},
                 "class_name": record.class_name,
@@ -166,13 +194,14 @@ class VideoPage:
             }
             for record in self.records
         ]
+        start = self.player.start if self.player else 0.0
+        return {"plays": self.player is not None, "start": start, "rows": rows}
 
     def html(self) -> str:
         """Return the page; it loads only the video."""
         shown = longest(self.records)
-        x = charts.time_axis(self.start, self.end, self.to_clock)
-        rows = self._rows(self.thumbnails)
-        start = self.player.start if self.player else 0.0
+        x = time_axis(self.start, self.end, self.to_clock)
+        settings = self.settings.with_paths(lambda path: Path(path).name)
         return render(
             "video.html",
             page=self,
@@ -187,7 +216,8 @@ class VideoPage:
             color_of=color_of,
             traffic=self._traffic(),
             paths=self._paths(),
-            table=table_json([VideoRows("", "", self.player is not None, start, rows)]),
+            table=table_json([ListedVideo("", "", self._table(self.thumbnails))]),
+            settings=render_settings(settings),
         )
 
     @property
@@ -236,18 +266,19 @@ class VideoPage:
 
         There are none if there is only one interval.
         """
-        intervals = Intervals([(self.clock, self.spans)], self.interval)
+        length, to_clock = self.settings.traffic.seconds or _INTERVAL, self.to_clock
+        intervals = Intervals([(self.clock, self.spans)], length)
         if len(intervals.periods) == 1:
             return []
         seen = [(record.class_name or UNKNOWN, record.first) for record in self._moved]
         events = self.counts.events if self.counts else ()
         counted = [(f"{event.name}: {event.direction}", event.time) for event in events]
-        plots, to_clock = [], self.to_clock
+        plots = []
         for title, items in (("First seen", seen), ("At lines and zones", counted)):
             series: dict[str, Counter[float]] = {name: Counter() for name, _ in items}
             for name, time in items:
                 series[name][intervals.start_in(0, intervals.number(0, time))] += 1
-            plots += [interval_plot(series, x, self.interval, title, to_clock)] if series else []
+            plots += [interval_plot(series, x, length, title, to_clock)] if series else []
         return plots
 
     def _traffic(self) -> Image | None:
@@ -255,8 +286,7 @@ class VideoPage:
         if self.poster is None or not self.survey:
             return None
         paths = {record.id: record.path for record in self.records}
-        traffic = self.survey.settings.traffic
-        return scene_picture(self.poster, traffic, self.survey.counts, paths)
+        return scene_picture(self.poster, self.settings.traffic, self.survey.counts, paths)
 
     def _paths(self) -> Image | None:
         """Return the poster with the paths of all vehicles; None if the camera moves."""
@@ -272,37 +302,127 @@ def longest(records: Sequence[VehicleRecord]) -> list[VehicleRecord]:
     return sorted(first, key=lambda record: (record.first, record.id))
 
 
-def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding]) -> list[TimelineBar]:
+def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding]) -> list[Bar]:
     """Return bars of when each vehicle is shown; vehicles that are not simultaneous share rows.
 
     The first row has the times at which the results are doubtful, if any.
     """
     fill, ink = _DOUBT
     bars = [
-        TimelineBar(0, first, last, title=finding.text, color=fill, ink=ink, label=finding.code)
+        Bar(first, last, 0, 1, fill, finding.text, finding.code, ink)
         for finding in findings
         for first, last in finding.spans
     ]
-    top, rows = bool(bars), charts.pack_rows((record.first, record.last) for record in shown)
+    top, rows = bool(bars), pack_rows((record.first, record.last) for record in shown)
     for record, row in zip(shown, rows, strict=True):
         bars += _vehicle_bars(record, top + row)
     return bars
 
 
-def _vehicle_bars(record: VehicleRecord, row: int) -> list[TimelineBar]:
+def _vehicle_bars(record: VehicleRecord, row: int) -> list[Bar]:
     """Return a bar for each time span in which a vehicle is tracked; the longest is labelled."""
     kind = f" ({record.class_name})" if record.class_name else ""
-    times = f"{charts.time_text(record.first)} to {charts.time_text(record.last)}"
+    times = f"{time_text(record.first)} to {time_text(record.last)}"
     fill = color_of(record.id)
     longest = max(record.followed, key=lambda span: span[1] - span[0])
     return [
-        TimelineBar(
-            row,
+        Bar(
             *span,
-            title=f"vehicle {record.id}{kind}: {times}",
+            row,
+            row + 1,
             color=hex_color(fill),
-            ink=hex_color(text_color(fill)),
+            title=f"vehicle {record.id}{kind}: {times}",
             label=f"#{record.id}" if span is longest else "",
+            ink=hex_color(text_color(fill)),
         )
         for span in record.followed
     ]
+
+
+@dataclass(frozen=True, slots=True)
+class ListedVideo:
+    """A video of a table or of a list.
+
+    Attributes
+    ----------
+    name
+        Name of the video.
+    address
+        Address of its page; empty for this page.
+    facts
+        Its summary.
+    """
+
+    name: str
+    address: str
+    facts: Mapping[str, Any]
+
+    @property
+    def folder(self) -> str:
+        """Prefix of addresses that are relative to the page."""
+        return self.address.removesuffix(PAGE_NAME)
+
+
+def table_json(videos: Sequence[ListedVideo]) -> str:
+    """Return the columns of the table for `vehicles.js`, which filters and sorts it.
+
+    Empty columns are omitted. `counts` has the number of rows of each video.
+    """
+    rows = [(video.folder, row) for video in videos for row in video.facts["rows"]]
+    columns: dict[str, list[Any]] = {
+        "class": [row["class_name"] or UNKNOWN for _, row in rows],
+        **{name: [row[name] for _, row in rows] for name in _COLUMNS},
+        "clock": [_plain_seconds(row["clock"]) for _, row in rows],
+        "picture": [row["picture"] and folder + row["picture"] for folder, row in rows],
+        "clip": [row["clip"] and folder + row["clip"] for folder, row in rows],
+    }
+    table = {
+        "names": [video.name for video in videos],
+        "pages": [video.address for video in videos],
+        "plays": [video.facts["plays"] for video in videos],
+        "starts": [video.facts["start"] for video in videos],
+        "counts": [len(video.facts["rows"]) for video in videos],
+        # Without rows, all columns are kept.
+        **{name: values for name, values in columns.items() if not rows or {*values} - {*_EMPTY}},
+    }
+    text = json.dumps(table, separators=(",", ":"), ensure_ascii=False)
+    return text.replace("<", "\\u003c")  # so that nothing in it ends the enclosing element
+
+
+def _plain_seconds(clock: str | None) -> int | None:
+    """Return a clock time as seconds since 1970, ignoring its zone."""
+    if clock is None:
+        return None
+    return round(datetime.fromisoformat(clock).replace(tzinfo=UTC).timestamp())
+
+
+def _listed(videos: Summaries) -> list[ListedVideo]:
+    """Return the videos that did not fail."""
+    return [
+        ListedVideo(name, link_to(Path(name).parent / values["page"], Path()), values)
+        for name, values in videos.items()
+        if "error" not in values
+    ]
+
+
+def _errors(videos: Summaries) -> dict[str, str]:
+    return {name: values["error"] for name, values in videos.items() if "error" in values}
+
+
+def write_index(videos: Summaries, target: Path) -> None:
+    """Write the page over many videos, from the summaries of their pages.
+
+    A video that failed has its `error` instead.
+    """
+    listed = _listed(videos)
+    counts = sum((Counter(video.facts["counts"]) for video in listed), Counter[str]())
+    table, failed = table_json(listed), _errors(videos)
+    write_text(
+        target, render("index.html", videos=listed, failed=failed, counts=counts, table=table)
+    )
+
+
+def write_reviews(videos: Summaries, target: Path) -> None:
+    """Write the list of reviews of many videos, from the summaries of these."""
+    listed = _listed(videos)
+    write_text(target, render("reviews.html", videos=listed, failed=_errors(videos)))

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
-from vdet.config.rendering import render_settings
 from vdet.config.schema import Settings
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
@@ -19,9 +18,8 @@ from vdet.media import VideoInfo
 from vdet.media.demux import is_pipe, plays_in_some_browser
 from vdet.media.images import encode_image, is_image_name
 from vdet.media.writer import can_be_copied, copy_part, encode_part, is_marked
-from vdet.pages.batch import write_index, write_reviews
 from vdet.pages.render import PAGE_NAME, REVIEW_NAME, link_to, thumbnail, webp_uri
-from vdet.pages.video import Player, VideoPage, longest
+from vdet.pages.video import Player, VideoPage, longest, write_index, write_reviews
 from vdet.regions import Regions
 from vdet.run.sinks.drawn import IMAGE_LABELS
 from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind, Writing, sink_function
@@ -163,8 +161,7 @@ def write_page(path: Path, context: SinkContext) -> Writing:
     keep(context.crops.end())
     for number in pictures.keys() - {vehicle.id for vehicle in traffic.vehicles}:
         pictures.pop(number).unlink()
-    settings, review = context.settings, context.path_of("review")
-    poster = context.poster.image(traffic.vehicles)
+    review, poster = context.path_of("review"), context.poster.image(traffic.vehicles)
     page = VideoPage(
         video=video,
         frames=frames,
@@ -178,9 +175,8 @@ def write_page(path: Path, context: SinkContext) -> Writing:
         poster=poster,
         still=context.poster.with_boxes(poster),
         player=_player(path, context, spans),
-        settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
+        settings=context.settings,
         survey=context.survey,
-        interval=settings.traffic.seconds or 60,
         clock=traffic.clock,
         pictures={number: picture.name for number, picture in pictures.items()},
         findings=findings_in(context.facts).items,
