@@ -201,3 +201,17 @@ def test_no_text_names_a_place_on_somebodys_machine() -> None:
         if LOCAL_PATH.search(line)
     ]
     assert found == []
+
+
+def test_no_module_gives_one_name_two_values() -> None:
+    """Where two modules are merged, the constant of one would silently replace the other's."""
+    named = re.compile(r"^([A-Z_][A-Z0-9_]*(?:, [A-Z_][A-Z0-9_]*)*) = ", re.MULTILINE)
+    twice = [
+        f"{module}: {name}"
+        for module, path in NAMES.items()
+        for name, number in Counter(
+            name for line in named.findall(path.read_text("utf-8")) for name in line.split(", ")
+        ).items()
+        if number > 1
+    ]
+    assert twice == []

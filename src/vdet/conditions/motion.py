@@ -1,16 +1,15 @@
 """What moved and was not detected: before a fixed camera, and before a moving one.
 
-Before a fixed camera, these are moving objects that are not detected vehicles. The background is a
-running median of the planes (McFarlane and Schofield 1995). Areas that differ from it, outside the
-boxes, are linked from plane to plane. Only objects that travel count, not leaves, flags or water on
-the lens. They count as vehicles if they are compact, not upright as people are, and have sharp
-edges, unlike rain, clouds and reflections.
+Before a fixed camera, these are moving objects that are not detected vehicles (`MotionWatch`). The
+background is a running median of the planes (McFarlane and Schofield 1995). Areas that differ from
+it, outside the boxes, are linked from plane to plane. Only objects that travel count, not leaves,
+flags or water on the lens. They count as vehicles if they are compact, not upright as people are,
+and have sharp edges, unlike rain, clouds and reflections.
 
-Weak detections that stay in view of a moving camera: possibly a vehicle ahead.
-
-Objects beside the road leave the view, false detections in single frames do not last, and dirt on
-the glass does not move in the frame. Before a fixed camera signs and buildings last, so this is not
-for fixed cameras.
+Before a moving camera, they are weak detections that stay in view: possibly a vehicle ahead
+(`WeakWatch`). Objects beside the road leave the view, false detections in single frames do not
+last, and dirt on the glass does not move in the frame. Before a fixed camera signs and buildings
+last, so this is not for fixed cameras.
 """
 
 import math
@@ -37,7 +36,7 @@ from vdet.findings import Finding
 from vdet.media import Picture
 from vdet.polygons import Point, Segment, meeting
 from vdet.track.track import Track
-from vdet.traffic.clock import Span, extend, joined, when
+from vdet.traffic.clock import GAP, Span, extend, joined, when
 
 _RATE = 8.0
 """Grey levels per second by which the background adapts."""
@@ -68,10 +67,24 @@ _SLOW = 0.2
 """Minimum speed of a vehicle, in its sizes per second."""
 _MIN_MOVERS, _MIN_FRACTION = 2, 0.15
 """Minimum number of movers, and minimum fraction of all that travelled, for a finding."""
-_GAP = 2.0
-"""Maximum seconds between movers of one span."""
 _FORGOTTEN = 10.0
 """Seconds after which the start of a track is forgotten."""
+
+# The limits of weak detections were set by hand. Half and twice of each change no finding of four
+# real clips, 49 s, but where they say so.
+
+_MIN_SCORE = 0.1
+"""Minimum score of a detection."""
+_MIN_WIDTH = 0.04
+"""Minimum width of a detection, as a fraction of the frame's: smaller ones are too frequent."""
+_COVERED = 0.5
+"""A detection belongs to a track if more than this fraction of the detection is in the box of the
+track, or of that box in the detection. If none did, a real clip would get a false finding.
+"""
+_SAME_IOU, _UNSEEN = 0.4, 0.5
+"""Minimum overlap of consecutive detections of one object, and the maximum seconds between them."""
+_SHORTEST = 3.0
+"""Minimum seconds between the first and the last detection of an object."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +250,7 @@ class MotionWatch:
                 self._missed += 1
                 self._crossed.update(mover.crossed)
                 end = max([mover.last, *(last for _, last in self._spans[-1:])])
-                extend(self._spans, mover.first, _GAP)
+                extend(self._spans, mover.first, GAP)
                 extend(self._spans, end, math.inf)
 
     def _areas(self, differs: Image, difference: Float32Array) -> Iterator[_Area]:
@@ -266,23 +279,6 @@ class MotionWatch:
 
 def _is_in(point: Point, covered: Image) -> bool:
     return bool(covered[int(point[1]), int(point[0])])
-
-
-# These limits were set by hand. Half and twice of each change no finding of four real clips, 49 s,
-# but where they say so.
-
-_MIN_SCORE = 0.1
-"""Minimum score of a detection."""
-_MIN_WIDTH = 0.04
-"""Minimum width of a detection, as a fraction of the frame's: smaller ones are too frequent."""
-_COVERED = 0.5
-"""A detection belongs to a track if more than this fraction of the detection is in the box of the
-track, or of that box in the detection. If none did, a real clip would get a false finding.
-"""
-_SAME_IOU, _GAP = 0.4, 0.5
-"""Minimum overlap of consecutive detections of one object, and the maximum seconds between them."""
-_SHORTEST = 3.0
-"""Minimum seconds between the first and the last detection of an object."""
 
 
 @dataclass(slots=True, eq=False)
@@ -319,14 +315,14 @@ class WeakWatch:
         """Add a frame with its detections and its tracks."""
         boxes = _weak_boxes(picture, detections, tracks)
         for item in self._objects:
-            if len(boxes) and time - item.last <= _GAP:
+            if len(boxes) and time - item.last <= _UNSEEN:
                 overlaps = iou_matrix(np.array([astuple(item.box)]), boxes)[0]
                 best = int(overlaps.argmax())
                 if overlaps[best] >= _SAME_IOU:
                     item.add(time, Box(*boxes[best].tolist()))
                     boxes = np.delete(boxes, best, axis=0)
         self._objects = [
-            item for item in self._objects if item.is_lasting or time - item.last <= _GAP
+            item for item in self._objects if item.is_lasting or time - item.last <= _UNSEEN
         ]
         new = (Box(*sides) for sides in boxes.tolist())
         self._objects += [_Object(time, time, box, box) for box in new]
