@@ -6,7 +6,7 @@ It is slow and simple. The tests and benchmarks compare the dense search with it
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.detect.svm.model import FeatureExtractor, LinearModel
+from vdet.detect.svm.model import LinearModel, describe
 from vdet.detect.svm.search import FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, WindowGrid
 
@@ -17,7 +17,6 @@ class PatchSearch:
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
         self._boxes = grid.boxes.tolist()
-        self._extractor = FeatureExtractor(model.features)
 
     def search(self, frame: FramePyramid, probability: float) -> tuple[Float32Array, Float32Array]:
         """Search a frame as `DenseSearch.search`."""
@@ -26,7 +25,7 @@ class PatchSearch:
             frame.cut(FrameStrip(slice(y, y + height), slice(x, x + width), side, side))
             for x, y, width, height in self._boxes
         )
-        vectors = np.stack([self._extractor.describe_channels(patch) for patch in patches])
+        vectors = np.stack([describe(patch, self._model.features) for patch in patches])
         probabilities = self._model.probabilities(vectors)
         sides = np.tile(WINDOW_SIDES, (len(vectors), 1))
         if regression is not None:

@@ -18,7 +18,7 @@ from seed import SEED
 from vdet.boxes import Box
 from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmModel, shipped_model
-from vdet.detect.svm.model import FeatureExtractor, LinearModel, load_model, resize
+from vdet.detect.svm.model import LinearModel, describe, load_model, resize, split
 from vdet.learn.svm.patches import find_patches, hold_out, read_patches
 from vdet.media import Picture
 from vdet.media.images import read_image
@@ -75,11 +75,15 @@ def test_the_shipped_model_classifies_the_last_patches_of_every_folder(
     files = find_patches([real_data / "vehicles.zip", real_data / "non-vehicles.zip"])
     held = hold_out(np.array([file.group for file in files]))
     chosen = [files[i] for i in np.flatnonzero(held)[::10]]
-    extractor = FeatureExtractor(shipped.model.features)
-    side = shipped.model.features.patch
+    features = shipped.model.features
+    side = features.patch
     patches = read_patches(chosen)
     vectors = np.stack(
-        [extractor.describe(resize(p, side, side)) for p in patches if p is not None]
+        [
+            describe(split(resize(patch, side, side), features), features)
+            for patch in patches
+            if patch is not None
+        ]
     )
     assert len(vectors) == len(chosen) > 300
     predicted = shipped.model.probabilities(vectors) >= 0.5

@@ -11,7 +11,7 @@ from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
 from vdet.config.kinds import FeatureSettings, WindowSettings
-from vdet.detect.svm.model import FeatureExtractor, LinearModel, resize
+from vdet.detect.svm.model import LinearModel, describe, resize, split
 from vdet.detect.svm.search import DenseSearch, FramePyramid
 from vdet.detect.svm.windows import WindowGrid, band_grid
 from vdet.media import Picture, Planes
@@ -66,10 +66,8 @@ def log_odds(probabilities: Float32Array) -> Float32Array:
 def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
     """Fit a model by ridge regression, each member on other patches."""
     patches, labels = _patches()
-    extractor = FeatureExtractor(features)
-    vectors = np.stack(
-        [extractor.describe(resize(patch, features.patch, features.patch)) for patch in patches]
-    )
+    crops = [resize(patch, features.patch, features.patch) for patch in patches]
+    vectors = np.stack([describe(split(crop, features), features) for crop in crops])
     parts = [np.arange(len(labels)) % (members + 1) != i for i in range(members)]
     fits = [_ridge(vectors[part].astype(np.float64), labels[part]) for part in parts]
     weights, biases = (np.array(item, np.float32) for item in zip(*fits, strict=True))

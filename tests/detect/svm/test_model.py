@@ -19,9 +19,9 @@ from seed import SEED
 from vdet.config.kinds import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.model import (
     BoxRegression,
-    FeatureExtractor,
     LinearModel,
     cut_window,
+    describe,
     halve,
     histogram,
     load_model,
@@ -216,7 +216,7 @@ def test_a_vector_of_the_seed_is_the_hog_of_opencv_and_the_histogram_of_numpy() 
     channels = cv2.split(cv2.cvtColor(PATCH, cv2.COLOR_BGR2YCrCb))
     hogs = [np.ravel(descriptor.compute(channel)) for channel in channels]
     counts = [np.histogram(channel, 32, range=(0, 256))[0] for channel in channels]
-    vector = FeatureExtractor(FEATURES).describe(PATCH)
+    vector = describe(split(PATCH, FEATURES), FEATURES)
     assert (FEATURES.hog_length, FEATURES.length) == (3 * 1568, 4800)
     assert vector.dtype == np.float32
     np.testing.assert_array_equal(vector, np.concatenate([*hogs, *counts]))
@@ -228,7 +228,7 @@ def test_a_halved_channel_is_described_at_half_its_size() -> None:
     descriptor = cv2.HOGDescriptor((32, 32), (8, 8), (4, 4), (4, 4), 8)
     hogs = [np.ravel(descriptor.compute(halve(channel))) for channel in (red, blue)]
     counts = [histogram(halve(channel), 32) for channel in (red, blue)]
-    whole, vector = (FeatureExtractor(item).describe(PATCH) for item in (FEATURES, features))
+    whole, vector = (describe(split(PATCH, item), item) for item in (FEATURES, features))
     np.testing.assert_array_equal(vector[:1568], whole[:1568])
     np.testing.assert_array_equal(vector[1568:4704], np.concatenate(hogs))
     np.testing.assert_array_equal(vector[4704:], [*whole[4704:4736], *np.concatenate(counts)])

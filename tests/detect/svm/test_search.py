@@ -33,7 +33,7 @@ from vdet.config.kinds import (
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmDetector
-from vdet.detect.svm.model import BoxRegression, FeatureExtractor, LinearModel, resize, split
+from vdet.detect.svm.model import BoxRegression, LinearModel, describe, resize, split
 from vdet.detect.svm.search import DenseSearch, FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, WindowGrid, Windows, window_grids
 from vdet.errors import FrameSizeError
@@ -227,7 +227,7 @@ def texture(side: int) -> Image:
 
 def texture_finder() -> LinearModel:
     """Return a model for which the texture is the most probable vehicle."""
-    vector = FeatureExtractor(FEATURES).describe(texture(64))
+    vector = describe(split(texture(64), FEATURES), FEATURES)
     vector[FEATURES.hog_length :] = 0
     weights = vector[np.newaxis] / np.linalg.norm(vector) ** 2
     one = np.ones(1, np.float32)

@@ -23,10 +23,11 @@ from vdet.config.kinds import FeatureSettings, HistogramSettings, HogSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.model import (
     BoxRegression,
-    FeatureExtractor,
     LinearModel,
+    describe,
     load_model,
     save_model,
+    split,
 )
 from vdet.errors import DataError
 from vdet.learn.svm.patches import (
@@ -98,12 +99,12 @@ def files(data: Path) -> list[PatchFile]:
     return find_patches([data])
 
 
-def describe(files: list[PatchFile], *, augmented: bool = False, jobs: int = 1) -> LabelledVectors:
+def described(files: list[PatchFile], *, augmented: bool = False, jobs: int = 1) -> LabelledVectors:
     return extract(files, SETTINGS.svm.features, augmented=augmented, jobs=jobs)
 
 
 def test_several_threads_give_the_same_as_one(files: list[PatchFile]) -> None:
-    one, three = (describe(files, augmented=True, jobs=jobs) for jobs in (1, 3))
+    one, three = (described(files, augmented=True, jobs=jobs) for jobs in (1, 3))
     for name in ("vectors", "vehicle", "sides", "origins"):
         np.testing.assert_array_equal(getattr(one, name), getattr(three, name))
     np.testing.assert_array_equal(one.groups, three.groups)
@@ -176,8 +177,9 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(
     assert model.box_regression is not None
     last = [file for file in files if file.is_boxed][-1]
     assert last.sides is not None
-    described = FeatureExtractor(SETTINGS.svm.features).describe(read_image(mined / last.name))
-    hogs = described[: SETTINGS.svm.features.hog_length]
+    features = SETTINGS.svm.features
+    vector = describe(split(read_image(mined / last.name), features), features)
+    hogs = vector[: features.hog_length]
     found = model.box_regression.sides(hogs[np.newaxis])[0]
     np.testing.assert_allclose(found[[1, 3]], np.array(last.sides, float)[[1, 3]], atol=0.1)
     np.testing.assert_allclose(found[[0, 2]], [-0.5, 0.5], atol=0.05)

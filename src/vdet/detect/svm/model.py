@@ -30,38 +30,21 @@ Channels = tuple[Image, Image, Image]
 """Luma, red and blue (YCrCb), uint8 `(H, W)` each; halved channels `(H / 2, W / 2)`."""
 
 
-class FeatureExtractor:
-    """Computes the feature vectors of patches; it has no state, so threads may share it.
+def describe(channels: Channels, settings: FeatureSettings) -> Float32Array:
+    """Compute the features of one patch from its channels: see `split`.
 
-    A vector begins with HOG, channel by channel, each as `cv2.HOGDescriptor.compute` gives it
-    (blocks column by column from the top, then cells, then orientations). The colour histogram
-    follows, channel by channel.
+    They begin with HOG, channel by channel, each as `cv2.HOGDescriptor.compute` gives it (blocks
+    column by column from the top, then cells, then orientations). The colour histogram follows,
+    channel by channel.
+
+    Returns
+    -------
+    float32 `(settings.length,)`: HOG 0 to 1, histogram in pixels.
     """
-
-    def __init__(self, settings: FeatureSettings) -> None:
-        self.settings = settings
-        self._descriptors = hog_descriptors(settings, settings.patch, settings.patch)
-
-    def describe(self, patch: Image) -> Float32Array:
-        """Compute the features of one patch.
-
-        Parameters
-        ----------
-        patch
-            BGR uint8 `(patch, patch, 3)`.
-
-        Returns
-        -------
-        float32 `(settings.length,)`: HOG 0 to 1, histogram in pixels.
-        """
-        return self.describe_channels(split(patch, self.settings))
-
-    def describe_channels(self, channels: Channels) -> Float32Array:
-        """Compute the features of one patch from its channels."""
-        pairs = zip(self._descriptors, channels, strict=True)
-        hogs = [np.ravel(hog.compute(channel)) for hog, channel in pairs]
-        histograms = [histogram(channel, self.settings.histogram.bins) for channel in channels]
-        return np.concatenate([*hogs, *histograms], dtype=np.float32)
+    pairs = zip(hog_descriptors(settings, settings.patch, settings.patch), channels, strict=True)
+    hogs = [np.ravel(hog.compute(channel)) for hog, channel in pairs]
+    histograms = [histogram(channel, settings.histogram.bins) for channel in channels]
+    return np.concatenate([*hogs, *histograms], dtype=np.float32)
 
 
 def split(image: Image, settings: FeatureSettings) -> Channels:

@@ -209,7 +209,7 @@ class Blocks:
         self._blocks = np.concatenate(blocks, axis=-1, dtype=np.float32)
 
     def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
-        """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
+        """Return the HOG of windows as `describe` orders it, float32 `(n, h)`."""
         steps = np.arange(self._features.blocks)
         columns = self._cells(x)[:, np.newaxis, np.newaxis] + steps[:, np.newaxis]
         rows = self._cells(y)[:, np.newaxis, np.newaxis] + steps
@@ -247,7 +247,7 @@ class Gradients:
         self._descriptors = hog_descriptors(features, features.patch, features.patch)
 
     def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
-        """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
+        """Return the HOG of windows as `describe` orders it, float32 `(n, h)`."""
         parts = []
         for number, (hog, channel) in enumerate(zip(self._descriptors, self._strip, strict=True)):
             corners = np.stack([x, y], axis=1) // self._features.shrink(number)

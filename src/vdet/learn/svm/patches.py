@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float32Array, Image
 from vdet.config.kinds import FeatureSettings
-from vdet.detect.svm.model import FeatureExtractor, resize
+from vdet.detect.svm.model import describe, resize, split
 from vdet.errors import DataError, escaped, printable
 from vdet.files import is_hidden, staged
 from vdet.media.images import IMAGE_SUFFIXES, decode_image
@@ -291,8 +291,6 @@ def extract(
     """
     from joblib import Parallel, delayed
 
-    extractor = FeatureExtractor(features)
-
     def samples_by_patch() -> Iterator[list[PatchSample]]:
         for file, image in zip(files, read_patches(files), strict=True):
             if image is None:
@@ -301,18 +299,18 @@ def extract(
             rng = np.random.default_rng(zlib.crc32(image.tobytes()))
             yield [whole, *(augment(whole, rng) if augmented else ())]
 
-    def describe(samples: Sequence[PatchSample]) -> tuple[Sequence[PatchSample], Float32Array]:
+    def described(samples: Sequence[PatchSample]) -> tuple[Sequence[PatchSample], Float32Array]:
         patches = [resize(sample.image, features.patch, features.patch) for sample in samples]
-        return samples, np.stack([extractor.describe(patch) for patch in patches])
+        return samples, np.stack([describe(split(patch, features), features) for patch in patches])
 
     in_threads = Parallel(jobs or core_count(), backend="threading", return_as="generator")
-    results = in_threads(delayed(describe)(samples) for samples in samples_by_patch())
+    results = in_threads(delayed(described)(samples) for samples in samples_by_patch())
     vectors: list[Float32Array] = []
     vehicle: list[bool] = []
     sides: list[Float32Array] = []
     origins: list[int] = []
-    for number, (samples, described) in enumerate(results):
-        vectors.append(described)
+    for number, (samples, features_of_samples) in enumerate(results):
+        vectors.append(features_of_samples)
         vehicle += [sample.vehicle for sample in samples]
         sides += [sample.sides for sample in samples]
         origins += [number] * len(samples)
