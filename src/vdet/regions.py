@@ -1,9 +1,8 @@
 """Regions: the parts of the frames of one video in which vehicles are shown."""
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol, TypeVar
 
 import cv2
 import numpy as np
@@ -18,16 +17,6 @@ log = logging.getLogger("vdet")
 
 _WHITE = 128
 """Minimum value of a pixel of a mask that is included."""
-
-
-class Standing(Protocol):
-    """A vehicle with a ground point, x and y in pixels."""
-
-    @property
-    def foot(self) -> Point: ...  # noqa: D102
-
-
-V = TypeVar("V", bound=Standing)
 
 
 class Regions:
@@ -77,10 +66,6 @@ class Regions:
         height, width = self.pixels.shape
         x, y = min(max(int(point[0]), 0), width - 1), min(max(int(point[1]), 0), height - 1)
         return bool(self.pixels[y, x])
-
-    def inside(self, vehicles: Iterable[V]) -> tuple[V, ...]:
-        """Return the vehicles whose foot is in a region in which they are shown."""
-        return tuple(vehicle for vehicle in vehicles if self.contains(vehicle.foot))
 
 
 def check_masks(settings: Sequence[RegionSettings]) -> None:

@@ -260,7 +260,7 @@ class RegionStep:
         """Keep the detections and vehicles whose foot is inside the regions."""
         contains, detections = self._regions.contains, result.detections
         rows = [row for row, item in enumerate(detections) if contains(item.box.foot)]
-        tracks = self._regions.inside(result.tracks)
+        tracks = tuple(track for track in result.tracks if contains(track.foot))
         return replace(result, detections=detections[rows], tracks=tracks)
 
 

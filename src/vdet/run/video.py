@@ -164,11 +164,7 @@ def saved_tracks(
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
     start, end = float(run.start or 0), math.inf if run.end is None else float(run.end)
     regions = Regions(run.settings.regions, *size)
-    frames = [
-        replace(frame, tracks=regions.inside(frame.tracks))
-        for frame in saved
-        if start <= frame.time < end
-    ]
+    frames = [frame.inside(regions) for frame in saved if start <= frame.time < end]
     return SceneTracks(frames, without(at_places(saved.findings), run.settings.conditions.ignore))
 
 

@@ -10,12 +10,13 @@ end of a video, use the class of the last row.
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from typing import Any, Literal, Protocol, runtime_checkable
 
 from vdet.boxes import Box, Boxes, Float64Array, cut_sides
 from vdet.config.classes import UNKNOWN
 from vdet.media import Picture
+from vdet.regions import Regions
 
 State = Literal["detected", "interpolated", "predicted"]
 """Source of a box in a frame: see `Track`."""
@@ -110,6 +111,11 @@ class FrameTracks:
     tracks: tuple[Track, ...]
     facts: Mapping[str, Any] = field(default_factory=dict)
     is_cut: bool = False
+
+    def inside(self, regions: Regions) -> "FrameTracks":
+        """Return the frame with the vehicles that are in a region in which they are shown."""
+        kept = tuple(track for track in self.tracks if regions.contains(track.foot))
+        return replace(self, tracks=kept)
 
     @property
     def boxes(self) -> Boxes:

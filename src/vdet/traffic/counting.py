@@ -455,11 +455,11 @@ class _Group:
                 step = (frame.time - latest.time) / max(1, frame.index - latest.index)
             latest = frame
             if frame.time >= video.start:
-                tracks = self._regions.inside(frame.tracks) if self._regions else frame.tracks
+                seen = frame.inside(self._regions) if self._regions else frame
                 index, time = frame.index + video.frame_shift, frame.time + video.shift
-                self.counter.update(replace(frame, index=index, time=time, tracks=tracks))
+                self.counter.update(replace(seen, index=index, time=time))
                 if video.meter:
-                    video.meter.add(replace(frame, tracks=tracks))
+                    video.meter.add(seen)
         video.last = round(latest.time, 6) if latest else video.first
         video.end = max(video.start, video.last + min(step, _LONGEST_STEP))
         video.next_shift = video.frame_shift + (latest.index + 1 if latest else 0)
