@@ -197,12 +197,12 @@ def extend(spans: list[Span], time: float, gap: float | None) -> None:
         spans.append((time, time))
 
 
-def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
-    """Join ascending times that are close together into spans; omit spans that are too short."""
+def joined(times: Iterable[float]) -> list[Span]:
+    """Join ascending times that are close together into spans."""
     spans: list[Span] = []
     for time in times:
         extend(spans, time, GAP)
-    return [(first, last) for first, last in spans if last - first >= shortest]
+    return spans
 
 
 def when(spans: Sequence[Span]) -> str:

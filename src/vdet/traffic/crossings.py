@@ -583,13 +583,20 @@ def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
             if is_positive and isinstance(border, Zone):
                 yield Crossing(float(path.times[0]), 0, APPEAR)
         elif run.is_positive != is_positive:
-            point = _border_point(path, border, run.start)
-            distance = math.dist(latest, point.position) if latest else math.inf
+            # Where the path passes the border, between the previous row and the first of the run.
+            rows = slice(run.start - 1, run.start + 1)
+            (ax, ay), (bx, by) = path.points[rows].tolist()
+            before, after = path.times[rows].tolist()
+            meets = border.meeting(((ax, ay), (bx, by)))  # None: beyond the line's ends
+            along = 1.0 if meets is None else meets
+            point = ax + along * (bx - ax), ay + along * (by - ay)
+            distance = math.dist(latest, point) if latest else math.inf
             if run.is_clear or run.height <= distance:  # else it is still near the latest crossing
                 is_positive, latest = run.is_positive, None
-                if point.is_on_border:
-                    latest, direction = point.position, border.directions[0 if is_positive else 1]
-                    yield Crossing(point.time, point.row, direction)
+                if meets is not None:
+                    latest, direction = point, border.directions[0 if is_positive else 1]
+                    row = run.start if along else run.start - 1
+                    yield Crossing(before + along * (after - before), row, direction)
 
 
 def _runs(path: VehiclePath, border: Border) -> Iterator[_SideRun]:
@@ -629,30 +636,3 @@ def _settling(
     settles = was_far | (is_outside & (np.round(times - since, DURATION_DIGITS) >= _SETTLED))
     settles[-1] |= is_far[-1]
     return settles, is_far | was_far
-
-
-@dataclass(frozen=True, slots=True)
-class _BorderPoint:
-    """Where a path passes a border: time in seconds, first row at or after it, and position.
-
-    `is_on_border` says whether it meets the line between its ends.
-    """
-
-    time: float
-    row: int
-    position: Point
-    is_on_border: bool
-
-
-def _border_point(path: VehiclePath, border: Border, row: int) -> _BorderPoint:
-    """Return where a path passes a border between the previous row and this one."""
-    (ax, ay), (bx, by) = path.points[row - 1 : row + 1].tolist()
-    before, after = path.times[row - 1 : row + 1].tolist()
-    fraction = border.meeting(((ax, ay), (bx, by)))
-    along = 1.0 if fraction is None else fraction
-    return _BorderPoint(
-        time=before + along * (after - before),
-        row=row if along else row - 1,
-        position=(ax + along * (bx - ax), ay + along * (by - ay)),
-        is_on_border=fraction is not None,
-    )

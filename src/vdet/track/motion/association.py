@@ -1,13 +1,10 @@
-"""Which detections and tracks show one vehicle.
+"""Which detections and tracks show one vehicle, and which vehicles hide others.
 
-Assignment of detections to vehicles, by position and appearance.
-
-Source: the order of the rounds is the matching cascade of Wojke, Bewley and Paulus, "Simple Online
-and Realtime Tracking with a Deep Association Metric", 2017; the buffered intersection over union is
-that of Yang et al., "Hard to Track Objects with Irregular Motions and Similar Appearances? Make It
-Easier by Buffering the Matching Space", 2023.
-
-Which vehicles hide others, and which tracks follow the same vehicle.
+Detections are assigned to vehicles by position and appearance. The order of the rounds is the
+matching cascade of Wojke, Bewley and Paulus, "Simple Online and Realtime Tracking with a Deep
+Association Metric", 2017; the buffered intersection over union is that of Yang et al., "Hard to
+Track Objects with Irregular Motions and Similar Appearances? Make It Easier by Buffering the
+Matching Space", 2023.
 
 On a flat road, nearer vehicles are lower in the image. So of two overlapping vehicles, the one with
 the lower bottom hides the other; two overlapping boxes at the same level show one vehicle, because
@@ -16,7 +13,6 @@ two would be in the same place.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,6 +34,71 @@ _UNITS = 20.0, 6.0, 6.0
 """Differences of luma, blue and red chroma, in levels, that count as one unit.
 
 Most vehicles differ from each other by more, and from themselves a second ago by less.
+"""
+
+# These limits were set by hand. What half and twice of each does was measured on 41 s of three real
+# roads with 38 vehicles: the fraction of the rows of tracks that changes.
+
+_REACH = 0.75
+_REACH_GROWTH = 0.35
+"""Maximum distance of a lost vehicle from its expected position, in sizes of the vehicle, and its
+growth per second that the vehicle was hidden. Half: 5 % of one or two roads. Twice: nothing.
+"""
+
+_NEAR = 1.5
+"""Maximum distance from a hidden vehicle to one that emerges, in sizes of the vehicle. Half: 5 % of
+two roads. Twice: nothing.
+"""
+
+_OPPOSED, _UP_AND_DOWN = 0.55, 0.1
+"""Minimum product of opposite velocities, in sizes per second, that belong to two vehicles, and the
+same for their vertical components: a turning vehicle first changes its horizontal motion. Half and
+twice: nothing.
+"""
+
+_MAX_UNLIKE = 1.2
+"""Maximum difference in appearance between a lost vehicle and a new one that may be the same. Half:
+5 % of one road. Twice: nothing.
+"""
+
+_GROWTH = 3.0
+"""Maximum ratio of the areas of both boxes. Half: 5 % of one road. Twice: nothing."""
+
+PART = 0.6
+"""A detection with more than this fraction inside another vehicle is a part of it. Half, or all:
+3 to 8 % of each road.
+"""
+
+HIDDEN = 0.5
+"""A vehicle is hidden if a nearer one covers more than this fraction of it. Half: below 1 %. All:
+2 to 6 % of each road.
+"""
+
+_LEVEL = 0.15
+"""Bottoms that differ by less than this fraction of the smaller height are level. Half: nothing.
+Twice: two vehicles of one road become one.
+"""
+
+_ALIKE = 0.5
+"""Minimum intersection over union of two boxes that show one vehicle, level or not. Half: two
+vehicles of one road become one. Never: 3 to 12 % of each road.
+"""
+
+_APART = 0.5
+"""Seconds for which two tracks may follow one vehicle, which drives away from its track while
+detections of its parts still hold that. After them, two tracks with detections are two vehicles,
+even if they are level. Half and twice: nothing.
+"""
+
+CLEAR = 0.8
+"""A detection on a nearer vehicle is a part of that vehicle if it scores less than this fraction.
+Half: 5 % of two roads. Always: 3 to 15 % of each.
+"""
+
+_DOUBTED = 0.5
+"""A detection is not a part of a vehicle that scores less than this fraction of the detection: the
+box of that vehicle may span two vehicles that were seen as one. Half: nothing. Twice: 3 % of one
+road.
 """
 
 
@@ -166,73 +227,6 @@ def assign(values: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
     return paired, column_of[paired]
 
 
-# These limits were set by hand. What half and twice of each does was measured on 41 s of three real
-# roads with 38 vehicles: the fraction of the rows of tracks that changes.
-
-_REACH = 0.75
-_REACH_GROWTH = 0.35
-"""Maximum distance of a lost vehicle from its expected position, in sizes of the vehicle, and its
-growth per second that the vehicle was hidden. Half: 5 % of one or two roads. Twice: nothing.
-"""
-
-_NEAR = 1.5
-"""Maximum distance from a hidden vehicle to one that emerges, in sizes of the vehicle. Half: 5 % of
-two roads. Twice: nothing.
-"""
-
-_OPPOSED, _UP_AND_DOWN = 0.55, 0.1
-"""Minimum product of opposite velocities, in sizes per second, that belong to two vehicles, and the
-same for their vertical components: a turning vehicle first changes its horizontal motion. Half and
-twice: nothing.
-"""
-
-_MAX_UNLIKE = 1.2
-"""Maximum difference in appearance between a lost vehicle and a new one that may be the same. Half:
-5 % of one road. Twice: nothing.
-"""
-
-_GROWTH = 3.0
-"""Maximum ratio of the areas of both boxes. Half: 5 % of one road. Twice: nothing."""
-
-
-PART = 0.6
-"""A detection with more than this fraction inside another vehicle is a part of it. Half, or all:
-3 to 8 % of each road.
-"""
-
-HIDDEN = 0.5
-"""A vehicle is hidden if a nearer one covers more than this fraction of it. Half: below 1 %. All:
-2 to 6 % of each road.
-"""
-
-_LEVEL = 0.15
-"""Bottoms that differ by less than this fraction of the smaller height are level. Half: nothing.
-Twice: two vehicles of one road become one.
-"""
-
-_ALIKE = 0.5
-"""Minimum intersection over union of two boxes that show one vehicle, level or not. Half: two
-vehicles of one road become one. Never: 3 to 12 % of each road.
-"""
-
-_APART = 0.5
-"""Seconds for which two tracks may follow one vehicle, which drives away from its track while
-detections of its parts still hold that. After them, two tracks with detections are two vehicles,
-even if they are level. Half and twice: nothing.
-"""
-
-CLEAR = 0.8
-"""A detection on a nearer vehicle is a part of that vehicle if it scores less than this fraction.
-Half: 5 % of two roads. Always: 3 to 15 % of each.
-"""
-
-_DOUBTED = 0.5
-"""A detection is not a part of a vehicle that scores less than this fraction of the detection: the
-box of that vehicle may span two vehicles that were seen as one. Half: nothing. Twice: 3 % of one
-road.
-"""
-
-
 def are_hidden(boxes: Float64Array, present: Sequence[bool]) -> BoolArray:
     """Return for each box whether another one covers more than half of it and is not farther away.
 
@@ -285,20 +279,6 @@ def take_over_ids(vehicles: Sequence[TrackedVehicle]) -> list[TrackedVehicle]:
     return remaining
 
 
-@dataclass(frozen=True, slots=True)
-class _BoxOverlap:
-    """How the box of a track overlaps that of another one.
-
-    `inside` is the fraction of it that is inside the other box. `same` says how much the two show
-    one vehicle: the fraction of the smaller box inside the other if they are level, 1 if they are
-    alike, else 0. `alike` says whether their intersection over union is high.
-    """
-
-    inside: float
-    same: float
-    alike: bool
-
-
 def without_duplicates(
     vehicles: Sequence[TrackedVehicle], boxes: Float64Array
 ) -> list[TrackedVehicle]:
@@ -312,11 +292,11 @@ def without_duplicates(
     boxes
         Their visible parts, x1, y1, x2, y2, `(n, 4)`.
     """
-    inside, alike = coverage(boxes, boxes), iou_matrix(boxes, boxes) > _ALIKE
-    overlaps = np.maximum(inside, inside.T)
+    inside, alike = coverage(boxes, boxes) > PART, iou_matrix(boxes, boxes) > _ALIKE
+    overlaps = inside | inside.T
     bottoms, heights = boxes[:, 3], boxes[:, 3] - boxes[:, 1]
-    level = abs(bottoms - bottoms[:, None]) < _LEVEL * np.minimum(heights, heights[:, None])
-    same = np.where(alike, 1.0, overlaps * level)
+    same = abs(bottoms - bottoms[:, None]) < _LEVEL * np.minimum(heights, heights[:, None])
+    same |= alike
     hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
     kept: list[int] = []
 
@@ -326,13 +306,13 @@ def without_duplicates(
 
     for row in sorted(range(len(vehicles)), key=rank):
         vehicle = vehicles[row]
-        overlapping = [at for at in kept if overlaps[row, at] > PART]
+        overlapping = [at for at in kept if overlaps[row, at]]
         for at in () if vehicle.unseen else overlapping:
             higher = vehicles[at]
             if higher.unseen or not higher.confirmed:
                 continue
-            overlap = _BoxOverlap(inside[row, at], same[row, at], alike[row, at])
-            if not _show_one_vehicle(vehicle, higher, overlap, hidden):
+            boxes_are = {"inside": inside[row, at], "same": same[row, at], "alike": alike[row, at]}
+            if not _show_one_vehicle(vehicle, higher, hidden, **boxes_are):
                 continue
             if vehicle.confirmed and min(vehicle.age, higher.age) > _APART:
                 vehicle.lose()  # it was apart, and now shows the vehicle that hides its own
@@ -348,23 +328,26 @@ def without_duplicates(
 def _show_one_vehicle(
     vehicle: TrackedVehicle,
     higher: TrackedVehicle,
-    overlap: _BoxOverlap,
     hidden: Sequence[TrackedVehicle],
+    *,
+    inside: bool,
+    same: bool,
+    alike: bool,
 ) -> bool:
     """Return whether a track shows the vehicle of an overlapping one of higher rank, or a part.
 
-    Both are detected. An unconfirmed track inside the other box may also be one of the `hidden`
-    vehicles that emerges, or one of two vehicles that this box spans.
+    Both are detected. Most of its box may be `inside` the other one; the boxes may be `alike`, or
+    the `same` vehicle's: alike or level. An unconfirmed track inside the other box may also be one
+    of the `hidden` vehicles that emerges, or one of two vehicles that this box spans.
     """
     if min(vehicle.age, higher.age) > _APART:
-        return overlap.alike
+        return alike
     if vehicle.confirmed:
-        return overlap.same > PART
-    if vehicle.scores.value <= higher.scores.value and overlap.same > PART:
+        return same
+    if vehicle.scores.value <= higher.scores.value and same:
         return True
     is_doubted = higher.detection_scores.value < _DOUBTED * vehicle.detection_scores.value
-    is_inside = overlap.inside > PART
-    return is_inside and not (is_doubted or _comes_out(vehicle, higher, hidden))
+    return inside and not (is_doubted or _comes_out(vehicle, higher, hidden))
 
 
 def _comes_out(
