@@ -19,8 +19,7 @@ from vdet.config.schema import Settings
 from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import SavedTracks
 from vdet.run.steps import FrameResult
-from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import Scene, pole_scene
+from vdet.synthetic import Scene, pole_scene, write_clip
 from vdet.track.track import Track
 
 SEEDS = (1, 2, 3, 4)

@@ -19,8 +19,7 @@ from vdet.config.schema import Settings
 from vdet.findings import Findings
 from vdet.labels.label import boxes_of
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer, true_boxes
-from vdet.synthetic.scene import Scene, pole_scene
+from vdet.synthetic import Renderer, Scene, pole_scene, true_boxes
 
 CHANGE = 4.0
 """Seconds after which the conditions change."""

@@ -14,8 +14,7 @@ from benchmarks.drawn_traffic import as_planes, follow, shown_labels, true_label
 from vdet.config.schema import Settings
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.evaluate.scores import Scores, score
-from vdet.synthetic.render import frames
-from vdet.synthetic.scene import (
+from vdet.synthetic import (
     LANE_WIDTH,
     LORRY,
     PinholeCamera,
@@ -23,6 +22,7 @@ from vdet.synthetic.scene import (
     SceneVehicle,
     Waypoint,
     empty_road,
+    frames,
     random_body,
     random_paint,
 )

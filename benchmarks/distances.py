@@ -22,8 +22,15 @@ from vdet.evaluate.report import table
 from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Frame, Picture
 from vdet.run.steps import LaneStep, with_positions
-from vdet.synthetic.render import Renderer, must_be_found, true_boxes
-from vdet.synthetic.scene import PinholeCamera, Scene, SceneVehicle, Waypoint
+from vdet.synthetic import (
+    PinholeCamera,
+    Renderer,
+    Scene,
+    SceneVehicle,
+    Waypoint,
+    must_be_found,
+    true_boxes,
+)
 from vdet.track.track import Track
 
 FRAMES = 100

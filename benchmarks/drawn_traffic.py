@@ -14,9 +14,9 @@ from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.frame import Coding
 from vdet.run.loop import Parts, build, peek
 from vdet.run.steps import FrameResult, Step
-from vdet.synthetic.render import STANDS, must_be_found, true_boxes
-from vdet.synthetic.scene import (
+from vdet.synthetic import (
     LANE_WIDTH,
+    STANDS,
     LaneLine,
     Light,
     PinholeCamera,
@@ -24,8 +24,10 @@ from vdet.synthetic.scene import (
     SceneVehicle,
     Waypoint,
     empty_road,
+    must_be_found,
     random_body,
     random_paint,
+    true_boxes,
 )
 from vdet.track.track import Track
 

@@ -11,8 +11,7 @@ from vdet.config.loading import find_config, load_settings
 from vdet.detect.svm.detector import SvmModel, load_svm
 from vdet.media import Picture
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import demo_scene
+from vdet.synthetic import demo_scene, write_clip
 
 FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
 

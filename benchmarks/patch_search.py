@@ -7,8 +7,7 @@ import numpy as np
 
 from vdet.boxes import Float32Array
 from vdet.detect.svm.model import LinearModel, describe
-from vdet.detect.svm.search import FramePyramid
-from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, WindowGrid
+from vdet.detect.svm.windows import WINDOW_SIDES, FramePyramid, FrameStrip, WindowGrid
 
 
 class PatchSearch:

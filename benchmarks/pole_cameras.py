@@ -22,10 +22,8 @@ from vdet.boxes import Float64Array
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.detect.detectors import DetectorModel, load_detector
-from vdet.lanes.camera import Undistorter
-from vdet.lanes.ground import Ground, fit_ground
-from vdet.synthetic.render import frames
-from vdet.synthetic.scene import (
+from vdet.lanes.camera import Ground, Undistorter, fit_ground
+from vdet.synthetic import (
     LANE_WIDTH,
     LORRY,
     Body,
@@ -34,6 +32,7 @@ from vdet.synthetic.scene import (
     SceneVehicle,
     Waypoint,
     empty_road,
+    frames,
     random_body,
     random_paint,
 )

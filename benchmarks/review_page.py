@@ -34,21 +34,24 @@ from vdet.review.strips import BandPassage, Passages, bands_of
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
 from vdet.run.steps import FrameResult
-from vdet.synthetic.render import Renderer, TrueBox, draw_vehicle, true_boxes
-from vdet.synthetic.scene import (
+from vdet.synthetic import (
     LANE_WIDTH,
     LORRY,
     PinholeCamera,
+    Renderer,
     Scene,
     SceneVehicle,
+    TrueBox,
     Waypoint,
+    draw_vehicle,
     empty_road,
     random_body,
     random_paint,
+    true_boxes,
 )
 from vdet.track.track import FrameTracks, Track
+from vdet.traffic.counter import LiveTraffic
 from vdet.traffic.counts import Counts
-from vdet.traffic.live import LiveTraffic
 
 SECONDS, VEHICLES, RATE = 3600, 600, Fraction(25, 2)
 EACH = VEHICLES // 20  # missed, false, and of a wrong class

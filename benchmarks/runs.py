@@ -16,8 +16,7 @@ from vdet.boxes import Box
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.detectors import DetectorModel, load_detector
-from vdet.labels.formats import TrackWriter, format_for
-from vdet.labels.label import SourceVideo
+from vdet.labels.label import SourceVideo, TrackWriter, format_for
 from vdet.media.reader import VideoReader
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output

@@ -14,7 +14,7 @@ from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.detectors import load_detector
 from vdet.detect.svm.detector import SvmDetector, SvmModel
-from vdet.detect.svm.search import DenseSearch
+from vdet.detect.svm.windows import DenseSearch
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 

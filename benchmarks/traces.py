@@ -20,7 +20,7 @@ from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
 from vdet.boxes import Image
 from vdet.review.strips import Band, BandPassage, Passages, bands_of, sampling_of
 from vdet.review.traces import TraceSearch
-from vdet.synthetic.render import frames
+from vdet.synthetic import frames
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Trace
 from vdet.traffic.crossings import lines_and_zones

@@ -28,8 +28,7 @@ from vdet.config.schema import Settings
 from vdet.findings import Finding
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import PinholeCamera, Scene, demo_scene, empty_road, pole_scene
+from vdet.synthetic import PinholeCamera, Renderer, Scene, demo_scene, empty_road, pole_scene
 
 SIZE = 640, 360
 RATE, SECONDS = 5, 12

@@ -12,8 +12,7 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import (
+from vdet.synthetic import (
     LANE_WIDTH,
     Body,
     PinholeCamera,
@@ -21,6 +20,7 @@ from vdet.synthetic.scene import (
     SceneVehicle,
     Waypoint,
     empty_road,
+    write_clip,
 )
 
 FOLDER = Path(__file__).parent

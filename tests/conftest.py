@@ -21,8 +21,7 @@ from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, Train
 from vdet.detect.svm.model import save_model
 from vdet.learn.svm.patches import find_patches
 from vdet.learn.svm.training import train
-from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import Scene, demo_scene
+from vdet.synthetic import Scene, demo_scene, write_clip
 
 # Seeded, so that a run of the tests says the same twice; and no test is a timing.
 settings.register_profile("vdet", derandomize=True, deadline=None)

@@ -14,8 +14,7 @@ import numpy as np
 
 from vdet.boxes import Box, Image
 from vdet.files import make_folder
-from vdet.synthetic.render import Renderer, TrueBox, true_boxes
-from vdet.synthetic.scene import PERIOD, Scene, busy_road
+from vdet.synthetic import PERIOD, Renderer, Scene, TrueBox, busy_road, true_boxes
 from writing import write_image
 
 PATCH = 64

@@ -27,8 +27,7 @@ from vdet.boxes import Image
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Scene
+from vdet.synthetic import Renderer, Scene
 from vdet.traffic.records import records_content
 from writing import write_image
 

@@ -7,7 +7,7 @@ import pytest
 
 from conftest import Run
 from vdet.media.reader import VideoReader
-from vdet.synthetic.scene import Scene, demo_scene
+from vdet.synthetic import Scene, demo_scene
 
 FRAMES = 60
 NAMES = {

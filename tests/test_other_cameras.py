@@ -15,8 +15,7 @@ from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.svm.windows import find_horizon
 from vdet.evaluate.scores import score
 from vdet.run.loop import peek
-from vdet.synthetic.render import frames
-from vdet.synthetic.scene import Light, PinholeCamera, Scene
+from vdet.synthetic import Light, PinholeCamera, Scene, frames
 
 LINEAR = Settings(detector=SvmSettings())
 FRAMES = 30

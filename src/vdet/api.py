@@ -37,8 +37,7 @@ from vdet.errors import ArgumentError, ArgumentTypeError, ImageError, VdetError
 from vdet.evaluate.results import score_files
 from vdet.evaluate.scores import Scores
 from vdet.files import OutputFiles, valid_text
-from vdet.labels.formats import Format
-from vdet.labels.label import SavedTracks, SourceVideo
+from vdet.labels.label import Format, SavedTracks, SourceVideo
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
@@ -50,8 +49,7 @@ from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkKind, check_sinks
 from vdet.run.steps import FrameResult, Step
 from vdet.run.video import Results, Run, RunTotals, run_video
-from vdet.track.factory import make_tracker
-from vdet.track.track import FrameTracks, Track, VideoTracker
+from vdet.track.track import FrameTracks, Track, VideoTracker, make_tracker
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord

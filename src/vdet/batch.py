@@ -38,8 +38,8 @@ from vdet.files import (
     remove_stale,
     write_whole,
 )
-from vdet.media.demux import reject_address
 from vdet.media.images import IMAGE_SUFFIXES, numbered_images
+from vdet.media.reader import reject_address
 from vdet.plugins import plugin_packages
 from vdet.run.images import input_files
 from vdet.run.loop import Parts

@@ -21,8 +21,7 @@ from vdet.learn.svm.training import train
 from vdet.progress import Progress
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
-from vdet.synthetic.render import write_clip, write_truth
-from vdet.synthetic.scene import Scene, busy_road, demo_scene, pole_scene
+from vdet.synthetic import Scene, busy_road, demo_scene, pole_scene, write_clip, write_truth
 from vdet.traffic.counting import count_files
 
 ROADS = 6

@@ -19,7 +19,7 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.run.steps import FrameResult, findings_in
 from vdet.track.track import Track, VideoTracker
-from vdet.traffic.live import LiveTraffic
+from vdet.traffic.counter import LiveTraffic
 
 RATE = 25
 """Frame rate of the videos that the checks make."""

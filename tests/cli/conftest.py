@@ -6,10 +6,9 @@ from pathlib import Path
 import pytest
 
 from red_cars import SETTINGS, red_finder
-from vdet.config.rendering import render_settings
+from vdet.config.loading import render_settings
 from vdet.detect.svm.model import save_model
-from vdet.synthetic.render import write_truth
-from vdet.synthetic.scene import Scene
+from vdet.synthetic import Scene, write_truth
 
 
 @pytest.fixture

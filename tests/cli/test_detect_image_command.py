@@ -9,8 +9,7 @@ from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
 from vdet.labels.reading import read_labelled_images
 from vdet.media.images import read_image
-from vdet.synthetic.render import Renderer, true_boxes
-from vdet.synthetic.scene import Scene
+from vdet.synthetic import Renderer, Scene, true_boxes
 from writing import write_image
 
 FEW_WINDOWS = only_windows("size: 160, overlap: 0.7, top: 380, bottom: 600")

@@ -9,7 +9,7 @@ import vdet
 from conftest import Run
 from labels.writers import WRITERS, Boxed, Labelled, show
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
-from vdet.config.rendering import render_settings
+from vdet.config.loading import render_settings
 from vdet.detect.svm.model import save_model
 
 CAR_BOX = (CAR.x1, CAR.y1, CAR.width, CAR.height)

@@ -17,8 +17,7 @@ from vdet.labels.label import boxes_of
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.patches import find_patches, read_patches
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import write_truth
-from vdet.synthetic.scene import Scene
+from vdet.synthetic import Scene, write_truth
 
 SETS = ", ".join(
     f"{{size: {size}, overlap: 0.875, top: {top}, bottom: {bottom}}}"

@@ -14,8 +14,7 @@ from vdet.findings import Finding
 from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.media import Frame, Picture
 from vdet.run.loop import Pipeline
-from vdet.track.factory import ShotTracker, timed
-from vdet.track.track import Track
+from vdet.track.track import ShotTracker, Track, timed
 from vdet.traffic.crossings import link_tracks
 
 SHOT = shot(1, 40)

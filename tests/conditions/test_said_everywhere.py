@@ -16,14 +16,14 @@ from red_cars import NullDetector
 from run.red_runs import outputs
 from vdet import load_settings
 from vdet.boxes import Image
-from vdet.config.rendering import render_settings
+from vdet.config.loading import render_settings
 from vdet.config.schema import OutputSettings
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
-from vdet.synthetic.render import Renderer
+from vdet.synthetic import Renderer
 
 FRAMES = 6 * RATE
 OTHER = Renderer(road(3, speed=20.0)).image(0)

@@ -10,7 +10,7 @@ import vdet
 from conftest import Run
 from red_cars import red_settings
 from running import write_drive
-from vdet.config.rendering import render_settings
+from vdet.config.loading import render_settings
 
 TEXT = "lanes: no values in metres without camera.lens, lanes.metres"
 NO_LANE = "the lane was found in 0 of 12 frames: check lanes.points in --stages"

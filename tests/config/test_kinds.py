@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from vdet.config.kinds import RulesTrackerSettings
-from vdet.config.loading import load_settings
-from vdet.config.rendering import render_settings
+from vdet.config.loading import load_settings, render_settings
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.errors import ConfigError
 

@@ -7,8 +7,7 @@ import yaml
 
 from seed import SEED
 from vdet.config.kinds import RulesTrackerSettings
-from vdet.config.loading import load_settings, parse_document
-from vdet.config.rendering import explanations, render_settings
+from vdet.config.loading import explanations, load_settings, parse_document, render_settings
 from vdet.config.scene import Shape
 from vdet.config.schema import Section, Settings, SvmSettings
 

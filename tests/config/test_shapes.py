@@ -7,8 +7,7 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from vdet.config.loading import load_settings
-from vdet.config.rendering import render_settings
+from vdet.config.loading import load_settings, render_settings
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError

@@ -5,7 +5,7 @@ import numpy.typing as npt
 import pytest
 
 from vdet.boxes import Box, Image
-from vdet.draw.boxes import (
+from vdet.draw import (
     BLACK,
     GREEN,
     RED,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from codings import in_any_coding
 from vdet.boxes import Box
 from vdet.config.scene import LineSettings, TrafficSettings, ZoneSettings
-from vdet.draw.boxes import (
+from vdet.draw import (
     BLACK,
     Color,
     Surface,

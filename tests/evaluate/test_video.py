@@ -13,8 +13,7 @@ from vdet.errors import TruthError
 from vdet.evaluate.results import ClipResult, evaluate_video
 from vdet.labels.reading import read_truth
 from vdet.progress import Progress, no_progress
-from vdet.synthetic.render import write_truth
-from vdet.synthetic.scene import Scene
+from vdet.synthetic import Scene, write_truth
 
 FRAMES = 10
 Evaluate = Callable[..., ClipResult]

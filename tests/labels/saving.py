@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.labels.formats import Format, TrackWriter
 from vdet.labels.label import (
+    Format,
     SavedTracks,
     SourceVideo,
+    TrackWriter,
     check_frames,
 )
 from vdet.labels.reading import read_tracks

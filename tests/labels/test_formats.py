@@ -11,14 +11,14 @@ from labels.saving import car, frame, written
 from labels.writers import exported
 from vdet.errors import OutputError, TruthError
 from vdet.labels.coco import COCO, read_coco
-from vdet.labels.formats import (
+from vdet.labels.label import (
     Format,
+    SavedTracks,
     check_track_name,
     format_for,
     track_formats,
     track_suffixes,
 )
-from vdet.labels.label import SavedTracks
 from vdet.labels.lines import MOT, read_mot
 from vdet.labels.reading import read_tracks, read_truth
 

@@ -16,9 +16,8 @@ from vdet.boxes import Box
 from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images, write_coco_images
-from vdet.labels.formats import Format, track_formats
 from vdet.labels.images import LabelledImage
-from vdet.labels.label import SavedTracks
+from vdet.labels.label import Format, SavedTracks, track_formats
 from vdet.labels.lines import CSV, JSON_LINES, MOT
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image

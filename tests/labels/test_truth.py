@@ -14,8 +14,7 @@ from vdet.config.loading import load_settings
 from vdet.errors import TruthError
 from vdet.evaluate.results import score_files
 from vdet.evaluate.scores import compare
-from vdet.labels.formats import Format, track_formats
-from vdet.labels.label import NO_ID, SavedTracks, SourceVideo, numbered_lines
+from vdet.labels.label import NO_ID, Format, SavedTracks, SourceVideo, numbered_lines, track_formats
 from vdet.labels.lines import MOT as MOT_FORMAT
 from vdet.labels.reading import DEFAULT_ROLES, Roles, read_truth
 

@@ -5,8 +5,7 @@ from benchmarks.drawn_traffic import lane_view
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Carriageway, LaneLine, Light, PinholeCamera, Scene
+from vdet.synthetic import Carriageway, LaneLine, Light, PinholeCamera, Renderer, Scene
 
 YELLOW = (60, 180, 225)
 

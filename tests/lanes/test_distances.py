@@ -8,8 +8,7 @@ from benchmarks.distances import FARTHEST, RIGHT, Drive, Sample, by_true_boxes
 from benchmarks.drawn_traffic import traffic_scene
 
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer, true_boxes
-from vdet.synthetic.scene import PinholeCamera, Scene, SceneVehicle, Waypoint
+from vdet.synthetic import PinholeCamera, Renderer, Scene, SceneVehicle, Waypoint, true_boxes
 
 FRAMES = 14
 SETTLED = 4

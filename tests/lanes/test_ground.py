@@ -10,8 +10,7 @@ from vdet.boxes import Float64Array
 from vdet.config.loading import load_settings
 from vdet.config.scene import CameraSettings, GroundPoint, LensSettings
 from vdet.errors import ConfigError
-from vdet.lanes.camera import Undistorter
-from vdet.lanes.ground import Ground, fit_ground, ground_of
+from vdet.lanes.camera import Ground, Undistorter, fit_ground, ground_of
 
 PLAIN = Undistorter(None, WIDTH, HEIGHT)
 EDGE = 0.5

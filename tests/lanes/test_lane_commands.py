@@ -21,14 +21,13 @@ from vdet.config.scene import LensSettings
 from vdet.config.schema import LaneSettings, OutputSettings, Settings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.model import save_model
-from vdet.draw.boxes import color_of
+from vdet.draw import color_of
 from vdet.lanes.camera import Undistorter, save_camera
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import PinholeCamera, Scene
+from vdet.synthetic import PinholeCamera, Renderer, Scene
 from writing import write_image
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10

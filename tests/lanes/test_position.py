@@ -15,8 +15,7 @@ from vdet.lanes.camera import TopView, Undistorter
 from vdet.lanes.road import LaneCurves, Road, RoadFinder, RoadPosition, position_on_road
 from vdet.media import Picture
 from vdet.run.steps import with_positions
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import PinholeCamera
+from vdet.synthetic import PinholeCamera, Renderer
 from vdet.track.track import Track
 
 CAMERA = PinholeCamera.dashboard(1280, 720)

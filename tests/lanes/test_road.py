@@ -13,8 +13,7 @@ from vdet.boxes import Float64Array, Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import CARRY, Lane, RoadFinder
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import LaneLine, Light, PinholeCamera, Shadow
+from vdet.synthetic import LaneLine, Light, PinholeCamera, Renderer, Shadow
 
 SHADOWS = tuple(
     Shadow(station, 8.0, 0.45, dappled)

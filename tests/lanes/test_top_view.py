@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from lanes.roads import settings_for
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import TopView
-from vdet.synthetic.scene import PinholeCamera
+from vdet.synthetic import PinholeCamera
 
 CAMERA = PinholeCamera.dashboard(1280, 720)
 

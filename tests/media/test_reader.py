@@ -18,10 +18,9 @@ from clips import ODD, joined, read_number, remuxed, sound_of, write_clip
 from vdet.config.schema import InputSettings, OutputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame
-from vdet.media.demux import Damage, Decoder
 from vdet.media.frame import Coding, ColorTags
 from vdet.media.images import Orientation
-from vdet.media.reader import VideoReader, next_time
+from vdet.media.reader import Damage, Decoder, VideoReader, next_time
 from vdet.media.writer import VideoWriter
 
 Image = NDArray[np.uint8]

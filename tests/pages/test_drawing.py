@@ -19,8 +19,7 @@ from vdet.boxes import Box
 from vdet.config.loading import given_values, load_settings, parse_document
 from vdet.config.schema import Settings
 from vdet.findings import Finding
-from vdet.lanes.camera import Undistorter
-from vdet.lanes.ground import fit_ground, ground_of
+from vdet.lanes.camera import Undistorter, fit_ground, ground_of
 from vdet.pages.drawing import Drawing
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counter import VehicleCounter

@@ -6,7 +6,7 @@ import pytest
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
 from vdet.boxes import Image, coverage
 from vdet.config.scene import LineSettings, TrafficSettings
-from vdet.draw.boxes import draw_label
+from vdet.draw import draw_label
 from vdet.pages.traffic import border_marks, direction_color, draw_marks, path_marks
 from vdet.polygons import Point
 from vdet.traffic.crossings import lines_and_zones

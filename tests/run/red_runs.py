@@ -24,7 +24,7 @@ from vdet.run.steps import FINDINGS, FrameResult
 from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock
-from vdet.traffic.live import LiveTraffic
+from vdet.traffic.counter import LiveTraffic
 
 COUNT = 60
 """Frames of the fixture `red_clip`."""

@@ -1,6 +1,6 @@
 """Small scenes without noise and shadows, on a plain road."""
 
-from vdet.synthetic.scene import (
+from vdet.synthetic import (
     Carriageway,
     LaneLine,
     Light,

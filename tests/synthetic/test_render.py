@@ -16,24 +16,22 @@ from hypothesis import strategies as st
 from synthetic.scenes import make_scene, parked
 from vdet.boxes import Box
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import (
+from vdet.synthetic import (
+    NEAR,
     STANDS,
+    PinholeCamera,
     Renderer,
+    Scene,
+    Shadow,
     TrueBox,
+    Waypoint,
+    beyond_near,
+    demo_scene,
     frames,
     must_be_found,
     true_boxes,
     write_clip,
     write_truth,
-)
-from vdet.synthetic.scene import (
-    NEAR,
-    PinholeCamera,
-    Scene,
-    Shadow,
-    Waypoint,
-    beyond_near,
-    demo_scene,
 )
 
 

@@ -6,10 +6,9 @@ from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.schema import Settings
 from vdet.media import Picture
-from vdet.track.factory import InterpolatingTracker, make_tracker
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules import RulesTracker
-from vdet.track.track import Track
+from vdet.track.track import InterpolatingTracker, Track, make_tracker
 
 
 def test_the_kind_decides_which_tracker_it_is() -> None:

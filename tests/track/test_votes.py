@@ -11,8 +11,7 @@ from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import MotionTrackerSettings, Settings
-from vdet.labels.formats import TrackWriter, last_classes, track_formats
-from vdet.labels.label import SourceVideo
+from vdet.labels.label import SourceVideo, TrackWriter, last_classes, track_formats
 from vdet.media import Picture
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules import RulesTracker

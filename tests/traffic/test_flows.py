@@ -18,8 +18,7 @@ from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, count_table, flow_table, per_hour, zone_table
-from vdet.traffic.output import counts_content, flows_content
-from vdet.traffic.tables import write_content
+from vdet.traffic.output import counts_content, flows_content, write_content
 
 WEST = LineSettings(name="west", start=(200, 200), end=(200, 600))
 EAST = LineSettings(name="east", start=(1000, 200), end=(1000, 600))

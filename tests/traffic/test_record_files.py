@@ -7,8 +7,8 @@ from running import rows_of
 from traffic.passing import WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.track.track import FrameTracks
+from vdet.traffic.output import read_table, write_content
 from vdet.traffic.records import join_records, records_content
-from vdet.traffic.tables import read_table, write_content
 
 HEADING = (
     "id,class,clock,first,last,seconds,detected,interpolated,predicted,mean_score,best_score,"

@@ -12,8 +12,7 @@ from traffic.scenes import CAR_HEIGHT, Path, settings_for, through, track
 from vdet.config.scene import ClockSettings, LineSettings, ZoneSettings
 from vdet.config.schema import InputSettings
 from vdet.errors import TruthError
-from vdet.labels.formats import TrackWriter
-from vdet.labels.label import SourceVideo
+from vdet.labels.label import SourceVideo, TrackWriter
 from vdet.labels.lines import JSON_LINES
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_files, natural_order

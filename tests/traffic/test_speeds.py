@@ -7,8 +7,7 @@ import pytest
 
 from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
 from vdet.boxes import Box, Float64Array
-from vdet.lanes.camera import Undistorter
-from vdet.lanes.ground import fit_ground
+from vdet.lanes.camera import Undistorter, fit_ground
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.counts import Counts, Event
 from vdet.traffic.speeds import SpeedMeter, Speeds, with_speeds

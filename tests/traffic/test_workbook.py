@@ -17,8 +17,7 @@ from vdet.findings import Finding
 from vdet.pages.traffic import page_table
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Corrected, Correction, Counts, Estimate, Event, VehicleGroup
-from vdet.traffic.measures import HEAVY_NAMED, movement
-from vdet.traffic.survey import Survey
+from vdet.traffic.survey import HEAVY_NAMED, Survey, movement
 from vdet.traffic.workbook import Sheet, SheetTable, write_workbook
 from vdet.version import __version__
 

@@ -128,8 +128,7 @@ def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image
     """Write a table, a workbook or a page; `scene` is the picture of the settings."""
     from vdet.pages.render import PAGE_NAME
     from vdet.pages.traffic import counts_page, scene_picture
-    from vdet.traffic.output import counts_content, flows_content, is_workbook
-    from vdet.traffic.tables import write_content
+    from vdet.traffic.output import counts_content, flows_content, is_workbook, write_content
     from vdet.traffic.workbook import write_workbook
 
     traffic = survey.settings.traffic

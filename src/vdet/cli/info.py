@@ -95,7 +95,7 @@ def _machine() -> Facts:
 
 def _camera(settings: "Settings") -> Facts:
     """Return lines, zones and the fit of the ground points in the settings of a camera."""
-    from vdet.lanes.ground import ground_of
+    from vdet.lanes.camera import ground_of
     from vdet.traffic.crossings import lines_and_zones
 
     size = settings.camera.size or _ANY_SIZE
@@ -163,7 +163,7 @@ def config(source: SettingsSource) -> None:
       vdet config > my.yaml
       vdet config -c seed --set output.crf=18
     """
-    from vdet.config.rendering import render_settings
+    from vdet.config.loading import render_settings
 
     print_lines(*render_settings(source.load()).splitlines())
 

@@ -1,22 +1,31 @@
-"""Layers of settings → one `Settings`: the defaults, then YAML files, then assignments.
+"""Read settings, and print them.
 
-The plain values of YAML text keep their position in the text, so that errors can name it.
+Layers become one `Settings`: the defaults, then YAML files, then assignments. The plain values of
+YAML text keep their position in the text, so that errors can name it. Printed, settings are YAML
+with a comment on every key, as `vdet config` shows them.
 """
 
+import ast
+import contextlib
 import copy
 import difflib
+import inspect
 import re
 import reprlib
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from functools import reduce
+from inspect import isclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails, to_jsonable_python
 from yaml.constructor import ConstructorError
 
 from vdet.config.kinds import GROUPS, default_kind, kind_of_model, tracker_defaults
@@ -42,6 +51,33 @@ _CANNOT_START = re.compile("found character '[%@`]' that cannot start any token"
 
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
+
+MAX_MISTAKES = 20
+"""Maximum number of mistakes that are shown."""
+
+_PACKAGE = Path(__file__).parents[1]
+# In a wheel the configs lie in the package; in a work tree beside `src`.
+_CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
+
+_SHAPES: dict[tuple[str, ...], type[Shape]] = {
+    ("camera", "ground"): GroundPoint,
+    ("regions",): RegionSettings,
+    ("traffic", "lines"): LineSettings,
+    ("traffic", "zones"): ZoneSettings,
+    ("lanes",): LaneSettings,
+}
+"""Where settings have shapes: a list of them, or one."""
+
+_EXPECTED = {
+    "model_type": "must be a section, key: value",
+    "string_type": "must be text; quote it",
+    "string_unicode": "must be UTF-8; rename the file or folder, or use a relative path",
+    "tuple_type": "must be a list",
+    "zoneinfo_str": "must be a time zone, such as Europe/Berlin",
+}
+
+HEADING = "# vdet settings. `vdet config` prints the effective ones."
+WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,14 +233,6 @@ def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:
     return value, {key: f"{name}:{mark.line + 1}:{mark.column + 1}" for key, mark in marks}
 
 
-MAX_MISTAKES = 20
-"""Maximum number of mistakes that are shown."""
-
-_PACKAGE = Path(__file__).parents[1]
-# In a wheel the configs lie in the package; in a work tree beside `src`.
-_CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
-
-
 def find_config(name: str) -> Path:
     """Return the shipped config of this name (`seed`), else the config file at this path.
 
@@ -306,16 +334,6 @@ def _with_sizes(layer: Document) -> Document:
     return layer
 
 
-_SHAPES: dict[tuple[str, ...], type[Shape]] = {
-    ("camera", "ground"): GroundPoint,
-    ("regions",): RegionSettings,
-    ("traffic", "lines"): LineSettings,
-    ("traffic", "zones"): ZoneSettings,
-    ("lanes",): LaneSettings,
-}
-"""Where settings have shapes: a list of them, or one."""
-
-
 def shapes_in(values: dict[str, Any]) -> Iterator[tuple[type[Shape], dict[str, Any]]]:
     """Yield the plain values of each shape in plain settings, with its class."""
     for keys, kind in _SHAPES.items():
@@ -376,15 +394,6 @@ def value_at(values: Any, *keys: str) -> Any:
     return values
 
 
-_EXPECTED = {
-    "model_type": "must be a section, key: value",
-    "string_type": "must be text; quote it",
-    "string_unicode": "must be UTF-8; rename the file or folder, or use a relative path",
-    "tuple_type": "must be a list",
-    "zoneinfo_str": "must be a time zone, such as Europe/Berlin",
-}
-
-
 def _describe(mistake: ErrorDetails, merged: Document) -> str:
     key = tuple(mistake["loc"])
     position = merged.position_of(key)
@@ -415,3 +424,87 @@ def _unknown(key: Key, section: type[Section]) -> str:
     if close := difflib.get_close_matches(str(key[-1]), keys, n=1):
         return f"{problem}; did you mean {close[0]}?"
     return f"{problem}; known settings: {', '.join(keys)}"
+
+
+def render_settings(settings: Settings) -> str:
+    """Write settings as YAML; reading the text gives the same settings again.
+
+    Each key is preceded by what it means; the keys of list items stand before the list.
+    """
+    # An item says only what it has, and its size only if it differs from that of the file.
+    values = to_jsonable_python(settings, exclude_none=True)
+    for _, shape in shapes_in(values):
+        if shape["size"] == list(settings.camera.size or FRACTIONS):
+            del shape["size"]
+    return "\n".join([HEADING, *_section(settings, values, "")]) + "\n"
+
+
+def explanations(section: type[Section]) -> Mapping[str, str]:
+    """Return what each key of a section means.
+
+    It is the description of its field, or else the text below the field in the source. That is read
+    here, and not by pydantic: parsing all sections would take a third of the start of a command.
+    """
+    texts: dict[str, str] = {}
+    for item in reversed(section.__mro__):
+        if not issubclass(item, Section):
+            continue
+        with contextlib.suppress(OSError):  # its source is not there
+            (kind,) = ast.parse(textwrap.dedent(inspect.getsource(item))).body
+            for field, text in pairwise(kind.body if isinstance(kind, ast.ClassDef) else ()):
+                match field, text:
+                    case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
+                        texts[name] = inspect.cleandoc(words)
+    described = {name: field.description for name, field in section.model_fields.items()}
+    return texts | {name: text for name, text in described.items() if text}
+
+
+def _section(section: Section, values: Mapping[str, Any], indent: str) -> Iterator[str]:
+    texts = explanations(type(section))
+    for name, info in type(section).model_fields.items():
+        value = getattr(section, name)
+        if name == "size" and isinstance(section, Shape) and name not in values:
+            continue
+        if not indent:
+            yield ""
+        if isinstance(value, Section):
+            yield from _comment(_first_line(type(value)), indent)
+            yield f"{indent}{name}:"
+            yield from _section(value, values[name], indent + "  ")
+            continue
+        for paragraph in texts.get(name, "").split("\n\n"):
+            yield from _comment(paragraph, indent)
+        yield from _item_keys(info, indent)
+        plain = values.get(name)
+        style, width = None if isinstance(plain, list) else False, WIDTH - len(indent)
+        text = yaml.safe_dump({name: plain}, default_flow_style=style, sort_keys=False, width=width)
+        yield from textwrap.indent(text, indent).splitlines()
+
+
+def _item_keys(field: FieldInfo, indent: str) -> Iterator[str]:
+    """Yield comments on the keys of the sections in a list, or of a section that may be null."""
+    for item in get_args(field.annotation):
+        if not (isclass(item) and issubclass(item, Section)):
+            continue
+        subject = "Each item" if get_origin(field.annotation) is tuple else "It"
+        title = _first_line(item)
+        yield from _comment(f"{subject} is {title[:1].lower()}{title[1:]}", indent)
+        texts = explanations(item)
+        for name in item.model_fields:
+            if name == "size" and issubclass(item, Shape):
+                continue  # explained at camera.size
+            yield from textwrap.wrap(
+                f"{name}: {texts.get(name, '')}",
+                WIDTH,
+                initial_indent=f"{indent}#   ",
+                subsequent_indent=f"{indent}#     ",
+            )
+
+
+def _first_line(section: type[Section]) -> str:
+    return (section.__doc__ or "").partition("\n")[0]
+
+
+def _comment(text: str, indent: str) -> list[str]:
+    prefix = f"{indent}# "
+    return textwrap.wrap(text, WIDTH, initial_indent=prefix, subsequent_indent=prefix)

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from zoneinfo import ZoneInfo
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
@@ -29,6 +29,8 @@ Size = tuple[Side, Side]
 """Width and height of frames, in pixels."""
 Name = Annotated[str, Field(min_length=1, max_length=80)]
 Approach = Literal["N", "NE", "E", "SE", "S", "SW", "W", "NW"]
+APPROACHES: tuple[Approach, ...] = get_args(Approach)
+"""The arms of a junction, clockwise from the north."""
 
 FRACTIONS = 1, 1
 """The size of points that are fractions of the frame."""

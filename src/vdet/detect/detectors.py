@@ -12,6 +12,9 @@ from vdet.errors import ConfigError
 from vdet.media import Picture
 from vdet.plugins import DETECTORS, load_plugin
 
+StageImages = Callable[[Image, Boxes], dict[str, Image]]
+"""Takes an image and its detections; returns an image of each stage by its name."""
+
 
 @runtime_checkable
 class VideoDetector(Protocol):
@@ -40,10 +43,6 @@ class VideoDetector(Protocol):
         Unless the detector is stateless, it is called in the order of the frames, and may remember
         earlier ones.
         """
-
-
-StageImages = Callable[[Image, Boxes], dict[str, Image]]
-"""Takes an image and its detections; returns an image of each stage by its name."""
 
 
 def stage_images_of(detector: VideoDetector) -> StageImages:

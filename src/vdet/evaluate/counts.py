@@ -13,7 +13,7 @@ from vdet.evaluate.report import figure, table
 from vdet.review.correcting import judge
 from vdet.review.corrections import Corrections, ReviewedEvent
 from vdet.traffic.counts import Counts, Event, class_of
-from vdet.traffic.tables import VIDEO, read_table
+from vdet.traffic.output import VIDEO, read_table
 
 _COLUMNS = "time", "name", "direction", "class", "id"
 ALL = "all"

@@ -1,9 +1,4 @@
-"""Reports of evaluations: their text and their pages.
-
-Text of evaluations: tables, ratios, and the measured detector.
-
-Reports of evaluations: as text, as values for JSON, and as a page that shows the mistakes.
-"""
+"""Reports of evaluations: as text, as values for JSON, and as a page that shows the mistakes."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,13 +11,44 @@ import numpy as np
 
 from vdet.boxes import Box, Float64Array, Image
 from vdet.config.schema import InputSettings
-from vdet.draw.boxes import Color
+from vdet.draw import Color
 from vdet.errors import printable, quantity
 from vdet.evaluate.results import ClipResult, ImagesResult, MeasuredSet, total
 from vdet.evaluate.scores import ClassResult, ComparedFrame, Comparison, class_results, score_boxes
 from vdet.media.reader import VideoReader
 from vdet.pages.render import render
 from vdet.version import __version__
+
+TRUE: Color = (90, 220, 60)
+DETECTED: Color = (40, 120, 255)
+
+_MAX_IMAGES, _MAX_CROPS = 9, 24  # of each source; of each video
+_SCALE = 3.0  # width of the part around a box, in sizes of the box
+
+_Mistake = tuple[ComparedFrame, Float64Array, float]
+"""A box without a pair in a frame, and its best IoU with any box of the other side.
+
+Near 0: no such box. Below 0.5: a poor fit. Above: the other box is matched with another one.
+"""
+
+_Named = tuple[str, object]
+"""A name and its scores."""
+
+_OF_BOXES = "precision", "recall", "f1", "ap50", "mean_iou", "false_positives"
+_OF_IMAGES = "images", "vehicles", *_OF_BOXES, "best_f1", "best_score"
+_OF_TRACKS = "mota", "idf1", "hota", "id_switches", "false_tracks", "mean_delay"
+_OF_VIDEO = *_OF_BOXES, "misses", *_OF_TRACKS
+_OF_CLASSES = "vehicles", "found", "right", "precision", "recall", "f1", "confused"
+"""The columns of tables: attributes of scores."""
+
+_HEADINGS = {
+    "f1": "F1", "ap50": "AP50", "mean_iou": "IoU", "false_positives": "false alarms",
+    "best_f1": "best F1", "best_score": "at score", "misses": "missed",
+    "mota": "MOTA", "idf1": "IDF1", "hota": "HOTA", "id_switches": "switches",
+    "false_tracks": "false tracks", "mean_delay": "delay", "right": "right class",
+    "confused": "confused with",
+}  # fmt: skip
+"""Headings of columns that differ from the name of the attribute."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +96,6 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     return [form.format(*row).rstrip() for row in (headings, *rows)]
 
 
-TRUE: Color = (90, 220, 60)
-DETECTED: Color = (40, 120, 255)
-
-_MAX_IMAGES, _MAX_CROPS = 9, 24  # of each source; of each video
-_SCALE = 3.0  # width of the part around a box, in sizes of the box
-
-
 @dataclass(frozen=True, slots=True)
 class Tile:
     """A BGR uint8 image with a title and a caption below it."""
@@ -98,13 +117,6 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
             drawn = _with_boxes(image.labelled.read(), image.shown.frames[0])
             alarms = quantity(scores.false_positives, "false alarm")
             yield Tile(drawn, image.labelled.path.name, f"{scores.misses} missed, {alarms}")
-
-
-_Mistake = tuple[ComparedFrame, Float64Array, float]
-"""A box without a pair in a frame, and its best IoU with any box of the other side.
-
-Near 0: no such box. Below 0.5: a poor fit. Above: the other box is matched with another one.
-"""
 
 
 def _mistakes(comparison: Comparison) -> dict[str, list[_Mistake]]:
@@ -156,26 +168,6 @@ def _with_boxes(image: Image, frame: ComparedFrame) -> Image:
         for x1, y1, x2, y2 in boxes.round().astype(int).tolist():
             cv2.rectangle(drawn, (x1, y1), (x2, y2), color, line)
     return drawn
-
-
-_Named = tuple[str, object]
-"""A name and its scores."""
-
-_OF_BOXES = "precision", "recall", "f1", "ap50", "mean_iou", "false_positives"
-_OF_IMAGES = "images", "vehicles", *_OF_BOXES, "best_f1", "best_score"
-_OF_TRACKS = "mota", "idf1", "hota", "id_switches", "false_tracks", "mean_delay"
-_OF_VIDEO = *_OF_BOXES, "misses", *_OF_TRACKS
-_OF_CLASSES = "vehicles", "found", "right", "precision", "recall", "f1", "confused"
-"""The columns of tables: attributes of scores."""
-
-_HEADINGS = {
-    "f1": "F1", "ap50": "AP50", "mean_iou": "IoU", "false_positives": "false alarms",
-    "best_f1": "best F1", "best_score": "at score", "misses": "missed",
-    "mota": "MOTA", "idf1": "IDF1", "hota": "HOTA", "id_switches": "switches",
-    "false_tracks": "false tracks", "mean_delay": "delay", "right": "right class",
-    "confused": "confused with",
-}  # fmt: skip
-"""Headings of columns that differ from the name of the attribute."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,10 @@ from vdet.track.track import Track
 
 _MAX_DETECTIONS = 1000  # in an image, those of the highest scores
 
+_log = logging.getLogger("vdet")
+
+_DEFAULT = Settings()
+
 
 @dataclass(frozen=True, slots=True)
 class Counting:
@@ -227,11 +231,6 @@ def best_f1(sources: Sequence[RankedPredictions]) -> tuple[float, float]:
     scores = np.unique(np.concatenate([ranked.scores for ranked in sources]))[::-1]
     means = np.mean([ranked.f1_at(scores) for ranked in sources], axis=0)
     return float(means.max()), float(scores[np.argmax(means)])
-
-
-_log = logging.getLogger("vdet")
-
-_DEFAULT = Settings()
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,16 @@ UNMATCHED = -1
 _IGNORED_FRACTION = 0.5
 _KEEP_BONUS = 1000.0  # larger than any sum of overlaps
 
+IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
+
+_RECALLS = np.linspace(0, 1, 101)
+
+_Pair = tuple[str | None, str | None]
+"""The classes of a vehicle and of its track. None: missed, or a false alarm."""
+
+ALPHAS = np.arange(0.05, 0.99, 0.05)
+"""The overlap thresholds of HOTA, 0.05 … 0.95; the metrics are the mean over them."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ComparedFrame:
@@ -251,11 +261,6 @@ def _names(ids: Int64Array, tracks: Iterable[Track]) -> tuple[str, ...]:
     """Return the last class of each id in the tracks."""
     names = {track.id: track.class_name for track in tracks if track.class_name}
     return tuple(names.get(id_, UNKNOWN) for id_ in ids.tolist())
-
-
-IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
-
-_RECALLS = np.linspace(0, 1, 101)
 
 
 @dataclass(frozen=True)
@@ -503,10 +508,6 @@ def class_results(comparison: Comparison) -> tuple[ClassResult, ...]:
     return tuple(_result(name, pairs) for name in ordered)
 
 
-_Pair = tuple[str | None, str | None]
-"""The classes of a vehicle and of its track. None: missed, or a false alarm."""
-
-
 def _pairs(comparison: Comparison) -> Iterator[_Pair]:
     together = Counter[tuple[int, int]]()
     for frame in comparison.frames:
@@ -537,10 +538,6 @@ def _result(name: str, pairs: Counter[_Pair]) -> ClassResult:
         f1=ratio(2 * right, shown + vehicles),
         named=named,
     )
-
-
-ALPHAS = np.arange(0.05, 0.99, 0.05)
-"""The overlap thresholds of HOTA, 0.05 … 0.95; the metrics are the mean over them."""
 
 
 def delays_of(comparison: Comparison) -> tuple[int | None, ...]:

@@ -27,11 +27,11 @@ from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.files import valid_text
-from vdet.labels.formats import Format, last_classes
 from vdet.labels.images import LabelledImage, image_names, inside_set
 from vdet.labels.label import (
     LIMIT,
     NO_ID,
+    Format,
     Index,
     Number,
     SavedTracks,
@@ -41,6 +41,7 @@ from vdet.labels.label import (
     checked_times,
     first_mistake,
     frame_number,
+    last_classes,
     line_error,
     read_bytes,
 )
@@ -48,6 +49,11 @@ from vdet.track.track import FrameTracks, Track
 
 _VIDEO = 1
 """Id of the only video."""
+
+_entry = partial(dataclass, frozen=True, slots=True, kw_only=True)
+
+_Entry = TypeVar("_Entry")
+_Entries = Annotated[list[_Entry], FailFast()]
 
 
 class _Writer:
@@ -121,9 +127,6 @@ def write_coco_images(file: BinaryIO, images: Sequence[LabelledImage]) -> None:
             category = writer.category(track.class_name or UNKNOWN)
             writer.add_box(number, track.box, category, track.score)
     writer.end(file)
-
-
-_entry = partial(dataclass, frozen=True, slots=True, kw_only=True)
 
 
 @_entry
@@ -200,10 +203,6 @@ class _Info:
 class _CocoVideo:
     vdet: SourceVideo | None = None
     """A key of our own."""
-
-
-_Entry = TypeVar("_Entry")
-_Entries = Annotated[list[_Entry], FailFast()]
 
 
 @_entry

@@ -29,6 +29,10 @@ from vdet.labels.label import (
 from vdet.media.images import is_image_name, read_header, read_image
 from vdet.track.track import Track
 
+_DATA = "data.yaml"
+_COLUMNS = 5
+_MIN_POLYGON = 7  # columns: the class and three points
+
 
 @dataclass(frozen=True, slots=True)
 class LabelledImage:
@@ -137,11 +141,6 @@ def image_folder(path: Path, names: Sequence[str]) -> Path:
         if folders:
             return folders[0]
     raise TruthError(f"{path}: its first image, {shown}, was not found beside it or below")
-
-
-_DATA = "data.yaml"
-_COLUMNS = 5
-_MIN_POLYGON = 7  # columns: the class and three points
 
 
 def _class_names(path: Path) -> dict[float, str]:

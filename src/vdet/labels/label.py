@@ -1,30 +1,32 @@
-"""Labelled boxes: one as it stands in a file, and those of a video.
+"""Labelled boxes of a video, and the formats of files of them.
 
-The limits, parsers and checks that apply to every format are here too.
+The limits, parsers and checks that apply to every format are here too. Formats are registered in
+the group `vdet.formats`: see `vdet.plugins`.
 """
 
 import codecs
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from itertools import chain
 from operator import attrgetter
 from pathlib import Path, PurePath, PurePosixPath
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 import numpy as np
 import pydantic
 from pydantic import AwareDatetime, Field, TypeAdapter, ValidationError
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.classes import standard_class
+from vdet.config.classes import UNKNOWN, standard_class
 from vdet.config.scene import EARLIEST, LATEST
-from vdet.errors import TruthError
+from vdet.errors import OutputError, TruthError
 from vdet.files import read_whole
 from vdet.findings import Finding
+from vdet.plugins import FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks, Track
 
 _VARIES = 0.1
@@ -37,9 +39,35 @@ NO_ID = -1
 Size = tuple[int, int]
 """Width and height in pixels."""
 
-
 Frames = Mapping[int, Sequence[Track]]
 """The boxes of each frame that has one, by its number from 0, in the order of a file."""
+
+LIMIT = 10_000_000
+"""Maximum frame number, id or pixel coordinate. Larger numbers mean damage, and would overflow."""
+
+MAX_BYTES = 300_000_000
+"""Maximum size of a file of boxes, unpacked."""
+
+_LAST_NUMBER = re.compile(r"(?<![0-9])([0-9]{1,8})$", re.ASCII)
+_LATEST = 1e11
+"""Maximum time in seconds, three thousand years of wall-clock time."""
+_MAX_RATE = 10_000
+"""Maximum frames per second on average; times in days have more."""
+
+Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False)]
+Index = Annotated[int, Field(ge=0, le=LIMIT)]
+"""Fields of JSON documents and of tables."""
+
+Times = dict[int, tuple[int | str, float]]
+"""The position in the file and the time, seconds, of each frame, counted from 0."""
+
+VIDEO, FINDINGS, LAST = "video", "findings", "last"
+"""Names of the facts about a video, of its first frame; of its findings, of its last; and, of both,
+whether the frame is the last, so that a file that was cut off is noticed.
+"""
+
+_AMBIGUOUS = (".txt", ".csv")
+"""Endings of several formats; the first line of the file decides."""
 
 
 def may_be_same(first: str, second: str) -> bool:
@@ -291,26 +319,6 @@ class SavedTracks:
         return set(self.frames).union(self.covered or ())
 
 
-LIMIT = 10_000_000
-"""Maximum frame number, id or pixel coordinate. Larger numbers mean damage, and would overflow."""
-
-MAX_BYTES = 300_000_000
-"""Maximum size of a file of boxes, unpacked."""
-
-_LAST_NUMBER = re.compile(r"(?<![0-9])([0-9]{1,8})$", re.ASCII)
-_LATEST = 1e11
-"""Maximum time in seconds, three thousand years of wall-clock time."""
-_MAX_RATE = 10_000
-"""Maximum frames per second on average; times in days have more."""
-
-Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False)]
-Index = Annotated[int, Field(ge=0, le=LIMIT)]
-"""Fields of JSON documents and of tables."""
-
-Times = dict[int, tuple[int | str, float]]
-"""The position in the file and the time, seconds, of each frame, counted from 0."""
-
-
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file. Raises `TruthError` if it is larger than `MAX_BYTES`."""
     return read_whole(path, limit=MAX_BYTES, what="file of boxes", error=TruthError)
@@ -368,3 +376,138 @@ def first_mistake(error: ValidationError) -> str:
     position = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
     return f"{position}: {message}" if position else message
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format of tracks.
+
+    Attributes
+    ----------
+    name
+        For messages.
+    suffix
+        Ending of its file names, lower case, with a leading dot.
+    read
+        Function that takes the path of a file, for messages, and its content. It raises
+        `TruthError` with the position of the first mistake; its labels are not checked elsewhere.
+    frame_lines, heading
+        For a format with lines for each frame: function that returns the lines, with line ends, and
+        the first line of the file.
+    write_video
+        For a format that is written at the end: function that writes all frames of a video.
+    read_head
+        Function like `read` for the first lines of a file; None if they have no times.
+    """
+
+    name: str
+    suffix: str
+    read: Callable[[Path, bytes], SavedTracks]
+    frame_lines: Callable[[FrameTracks], Iterable[str]] | None = None
+    heading: str = ""
+    write_video: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
+    read_head: Callable[[Path, bytes], SavedTracks] | None = None
+
+
+class TrackWriter:
+    """Writes the tracks of a video into a binary file, each frame when the next one is known."""
+
+    def __init__(self, form: Format, file: BinaryIO, video: SourceVideo) -> None:
+        self._form, self._file, self._video = form, file, video
+        self._kept: list[FrameTracks] = []
+        self._last: FrameTracks | None = None
+        self._file.write(form.heading.encode())
+
+    def write(self, frame: FrameTracks) -> None:
+        """Add a frame."""
+        if not self._form.frame_lines:
+            self._kept.append(replace(frame, facts={}))
+            return
+        if self._last:
+            self._write_lines(self._last)
+        else:
+            values = self._video.record()
+            frame = replace(frame, facts={VIDEO: values, LAST: False, **frame.facts})
+        self._last = frame
+
+    def end(self, findings: tuple[Finding, ...] = ()) -> None:
+        """Write everything that is left, with the findings. Not called after an error."""
+        if self._form.write_video:
+            self._form.write_video(self._file, replace(self._video, findings=findings), self._kept)
+        elif self._last:
+            said = {FINDINGS: [finding.record() for finding in findings]} if findings else {}
+            facts = {**self._last.facts, LAST: True, **said}
+            self._write_lines(replace(self._last, facts=facts))
+
+    def _write_lines(self, frame: FrameTracks) -> None:
+        assert self._form.frame_lines
+        self._file.writelines(line.encode() for line in self._form.frame_lines(frame))
+
+
+def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
+    """Return the class that each track has in its last frame, or `UNKNOWN`, by ascending id."""
+    classes = {t.id: t.class_name or UNKNOWN for frame in frames for t in frame.tracks}
+    return dict(sorted(classes.items()))
+
+
+def track_formats() -> list[Format]:
+    """Return all formats of tracks, those of vdet first. Raises `ConfigError`."""
+    return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
+
+
+def track_suffixes() -> list[str]:
+    """Return the endings of files of tracks."""
+    return [form.suffix for form in track_formats()]
+
+
+def format_for(path: Path) -> Format | None:
+    """Return the format by the ending of a name; None if it is unknown."""
+    matching = [form for form in track_formats() if path.name.lower().endswith(form.suffix)]
+    return max(matching, key=lambda form: len(form.suffix), default=None)
+
+
+def check_track_name(path: Path) -> None:
+    """Raise `OutputError` for `.kitti.txt`, which 1.0 wrote; MOTChallenge has its ending, too."""
+    if path.name.lower().endswith(".kitti.txt"):
+        raise OutputError(f"{path}: KITTI tracks are no longer written; use .txt or .coco.json")
+
+
+def recognize(path: Path, data: bytes) -> Format:
+    """Return the format of a file, by its name, or by its content if the name is ambiguous.
+
+    Raises
+    ------
+    TruthError
+        The file is empty, and the ending of its name is unknown; its columns are not separated by
+        commas; or it is XML.
+    """
+    by_name = format_for(path)
+    if by_name and by_name.suffix not in _AMBIGUOUS:
+        return by_name
+    content = _format_name(path, data)
+    form: Format | None = load_plugin(FORMATS, content) if content else by_name
+    if form is None:
+        suffixes = ", ".join(track_suffixes())
+        raise TruthError(f"{path}: is empty; tracks and ground truth must be one of {suffixes}")
+    return form
+
+
+def _format_name(path: Path, data: bytes) -> str | None:
+    """Return the registered name of the format of a file; None if it is empty."""
+    _, first = next(numbered_lines(path, data), (0, ""))
+    if not first:
+        return None
+    if first.startswith("<"):
+        raise TruthError(f"{path}: XML is not supported; export the labels as COCO")
+    if first[0] in "{[":
+        return "coco"
+    if re.match(r"\S+ \S+ [A-Za-z]", first):
+        raise TruthError(f"{path}: KITTI tracks are no longer read; use MOTChallenge or COCO")
+    starts_with_number = first[0] in "0123456789+-."
+    if "," in first or (starts_with_number and ";" not in first):
+        return "mot" if starts_with_number else "csv"
+    separator = "tabs" if "\t" in first else "semicolons" if ";" in first else "spaces"
+    raise TruthError(
+        f"{path}: columns are separated by {separator}; they must be separated by commas, as in "
+        "MOTChallenge and CSV"
+    )

@@ -24,9 +24,10 @@ from vdet.config.scene import parse_date_time
 from vdet.errors import TruthError
 from vdet.files import json_line
 from vdet.findings import Finding
-from vdet.labels.formats import VIDEO, Format
 from vdet.labels.label import (
     LIMIT,
+    VIDEO,
+    Format,
     Index,
     Number,
     SavedTracks,
@@ -51,6 +52,10 @@ _COLUMNS = (
 _NEEDED = _COLUMNS[:7]
 
 _Whole = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
+
+_log = logging.getLogger("vdet")
+_MAX_CLASSES = 100  # more are positions, in the eighth column of results
+_TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -255,12 +260,9 @@ JSON_LINES = Format(
     _json_lines,
     read_head=partial(read_json_lines, is_head=True),
 )
+
+
 CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n", read_head=read_csv)
-
-
-_log = logging.getLogger("vdet")
-_MAX_CLASSES = 100  # more are positions, in the eighth column of results
-_TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,6 +279,8 @@ class _MotRow:
 
 
 _MOT_ROW = TypeAdapter(_MotRow)
+
+
 _NAMES = tuple(_MotRow.__annotations__)
 
 

@@ -20,16 +20,18 @@ from vdet.config.schema import Role, Settings
 from vdet.errors import TruthError, printable, quantity
 from vdet.files import is_hidden
 from vdet.labels.coco import read_coco_images
-from vdet.labels.formats import Format, recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, is_file, read_yolo_images
 from vdet.labels.label import (
     NO_ID,
+    Format,
     SavedTracks,
     Size,
     check_frames,
     line_error,
     mistake_in_box,
     read_bytes,
+    recognize,
+    track_formats,
 )
 from vdet.labels.lines import MOT
 from vdet.track.track import Track
@@ -38,6 +40,16 @@ _IGNORED = ("tram", "train", "misc", "trailer", "caravan", "rider")
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
 _REGION_LETTERS = tuple(dict.fromkeys(map(letters, _REGIONS)))
 _ANY_KIND = ("car", "truck", "bus")  # included in the class "vehicle" of a detector
+
+_log = logging.getLogger("vdet")
+
+_HEAD_LINES, _MAX_LINE = 3, 1_000_000
+"""Number of lines of a head, and maximum bytes of each."""
+
+_PERCENT = 100
+"""If all boxes end below it, in images more than twice as large, they are probably percent."""
+_SLACK = 0.1
+"""How far a box may extend beyond a side of the image, as a fraction of it."""
 
 
 def _key(word: str) -> str:
@@ -113,9 +125,6 @@ def is_region(label: str | None) -> bool:
     return label is not None and letters(label) in _REGION_LETTERS
 
 
-_log = logging.getLogger("vdet")
-
-
 def read_tracks(path: Path, rate: float | None = None, size: Size | None = None) -> SavedTracks:
     """Read the tracks of a video from a file in any format; ignore regions are omitted.
 
@@ -159,10 +168,6 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
         fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
         raise TruthError(f"{path}: {fault}")
     return saved if rate is None else saved.at_rate(rate)
-
-
-_HEAD_LINES, _MAX_LINE = 3, 1_000_000
-"""Number of lines of a head, and maximum bytes of each."""
 
 
 def read_head(path: Path) -> SavedTracks:
@@ -253,12 +258,6 @@ def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledIm
         There is no labelled set, or it has a mistake; the message names its position.
     """
     return _checked_images(str(path), _images(path), roles)
-
-
-_PERCENT = 100
-"""If all boxes end below it, in images more than twice as large, they are probably percent."""
-_SLACK = 0.1
-"""How far a box may extend beyond a side of the image, as a fraction of it."""
 
 
 def _checked_images(name: str, images: Iterable[LabelledImage], roles: Roles) -> LabelledImages:

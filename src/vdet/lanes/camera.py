@@ -1,12 +1,15 @@
-"""The lens of a camera: its calibration, and frames without its distortion.
+"""A camera: its lens, the road from straight above, and where on the road a pixel is.
 
-Frames without the distortion of a lens, and the road as seen from straight above.
+The lens is calibrated by chessboard photographs (Zhang 2000, in OpenCV's implementation), and its
+distortion can be removed from frames.
 
 In the top view the ground is taken as flat. Its coordinates are x, metres to the right of the
 camera, and z, metres ahead of it. The column of the vanishing point is x = 0 at every distance;
 that is exact if the camera looks along the road and does not roll.
 
-Chessboard photographs → a camera (Zhang 2000, in OpenCV's implementation).
+The road plane is fitted to points whose metres are known, and taken as flat, too. A homography
+(Hartley and Zisserman 2004, ch. 4) is fitted so that the squared distances in pixels are smallest,
+because it is pixels that are read off a picture.
 """
 
 import math
@@ -22,9 +25,9 @@ import yaml
 from pydantic import ValidationError
 
 from vdet.boxes import Box, Float32Array, Float64Array, Image
-from vdet.config.scene import LensSettings
+from vdet.config.scene import CameraSettings, LensSettings
 from vdet.config.schema import LaneSettings
-from vdet.errors import ImageError
+from vdet.errors import ConfigError, ImageError
 from vdet.files import write_whole
 from vdet.media.images import read_image
 
@@ -34,6 +37,36 @@ _OUTLINE = np.array([(x, y) for x in _SIDE_POINTS for y in _SIDE_POINTS if {x, y
 
 Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 """Where each pixel comes from, as OpenCV takes it."""
+
+ACROSS = 30.0
+"""Pixels per metre, across the road."""
+ALONG = 8.0
+"""Pixels per metre, along the road."""
+_ASSUMED = 3.7, 37.0
+"""`lanes.metres` where it is not set, across and along: for the search, not for results."""
+_MARGIN = 3.0
+"""Metres of road that are shown on each side of the lane."""
+
+MIN_PHOTOS = 5
+SIZE_TOLERANCE = 2
+"""Pixels by which the sides of a photograph may differ from those of the others."""
+MAX_SEARCH_PIXELS = 1_300_000
+"""A larger photograph is reduced to this size for the search of the board: OpenCV's search takes
+minutes on large photographs with grass or gravel."""
+OUTLIER_RATIO = 3.0
+"""A photograph is dropped if its error is more than this many times the median error."""
+MIN_ANGLE = 15.0
+"""Degrees by which the boards of at least two photographs must be turned against each other."""
+
+Pattern = tuple[int, int]
+"""Number of inner corners of a chessboard, along and across."""
+
+_THIN = 0.01
+"""Width of points that count as one line, as a fraction of their length."""
+_MIN_LENGTH = 1.0
+"""Minimum length of the area, metres."""
+_MAX_ERROR = 0.03
+"""Largest error of the fit, as a fraction of the length of the area."""
 
 
 def warped(layer: Image, maps: Maps, outside: int = 0) -> Image:
@@ -103,16 +136,6 @@ def save_camera(lens: LensSettings, path: Path, *, overwrite: bool = False) -> N
     heading = "# A camera, written by `vdet calibrate`; lengths are pixels of its photographs.\n"
     text = yaml.safe_dump({"camera": {"lens": lens.model_dump(mode="json")}}, sort_keys=False)
     write_whole(path, heading + text, overwrite=overwrite)
-
-
-ACROSS = 30.0
-"""Pixels per metre, across the road."""
-ALONG = 8.0
-"""Pixels per metre, along the road."""
-_ASSUMED = 3.7, 37.0
-"""`lanes.metres` where it is not set, across and along: for the search, not for results."""
-_MARGIN = 3.0
-"""Metres of road that are shown on each side of the lane."""
 
 
 class TopView:
@@ -185,21 +208,6 @@ def _transform(matrix: Float64Array, points: Float64Array) -> Float64Array:
     """Apply a homography to points `(n, 2)`."""
     moved = points @ matrix[:, :2].T + matrix[:, 2]
     return np.asarray(moved[:, :2] / moved[:, 2:])
-
-
-MIN_PHOTOS = 5
-SIZE_TOLERANCE = 2
-"""Pixels by which the sides of a photograph may differ from those of the others."""
-MAX_SEARCH_PIXELS = 1_300_000
-"""A larger photograph is reduced to this size for the search of the board: OpenCV's search takes
-minutes on large photographs with grass or gravel."""
-OUTLIER_RATIO = 3.0
-"""A photograph is dropped if its error is more than this many times the median error."""
-MIN_ANGLE = 15.0
-"""Degrees by which the boards of at least two photographs must be turned against each other."""
-
-Pattern = tuple[int, int]
-"""Number of inner corners of a chessboard, along and across."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -338,3 +346,131 @@ def _fit(
 
 def _size_text(size: Iterable[int]) -> str:
     return "×".join(map(str, size))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """The road plane in frames of one size.
+
+    Attributes
+    ----------
+    to_metres
+        Homography `(3, 3)` from pixels of the undistorted frame, positive below the horizon.
+    area
+        Corners of the calibrated area in order around it, metres `(n, 2)`.
+    error, pixel_error
+        Root mean square distance of the points from the fit, metres and pixels.
+    row
+        Metres of road per row of pixels at the points, the median.
+    """
+
+    to_metres: Float64Array
+    area: Float64Array
+    error: float
+    pixel_error: float
+    row: float
+    undistorter: Undistorter
+
+    @property
+    def length(self) -> float:
+        """The largest distance in the calibrated area, metres."""
+        return _length(self.area)
+
+    @property
+    def scale_error(self) -> float:
+        """Relative standard deviation of lengths, for points that are off by at least a pixel."""
+        return self.row * max(self.pixel_error, 1.0) / self.length
+
+    def metres(self, pixels: Float64Array) -> Float64Array:
+        """Return where on the road points `(n, 2)` of the frame are, metres `(n, 2)`.
+
+        Whole numbers of pixels are the edges of pixels, as in boxes. NaN above the horizon, and
+        farther from the calibrated area than its own length.
+        """
+        metres = _mapped(self.to_metres, self.undistorter.points(pixels - 0.5))
+        along = np.roll(self.area, -1, axis=0) - self.area
+        outward = np.column_stack([along[:, 1], -along[:, 0]]) / _lengths(along)[:, None]
+        outside = (metres[:, None] - self.area) * outward
+        beyond = outside.sum(axis=2).max(axis=1)
+        return np.where((beyond <= self.length)[:, None], metres, np.nan)
+
+
+def ground_of(camera: CameraSettings, width: int, height: int) -> Ground | None:
+    """Fit the road plane of a camera for frames of `width` × `height` pixels.
+
+    None without points, and where these do not give lengths along the road.
+
+    Raises
+    ------
+    ConfigError
+        The points do not fix a plane or do not fit together, or the lens is for other frames.
+    """
+    if not camera.ground or camera.lack_of_speeds:
+        return None
+    points = [point.for_frames(width, height) for point in camera.ground]
+    pixels = np.array([point.pixel for point in points], np.float64)
+    metres = np.array([point.metres for point in points], np.float64)
+    return fit_ground(pixels, metres, Undistorter(camera.lens, width, height))
+
+
+def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistorter) -> Ground:
+    """Fit the plane to points in pixels of the frame and in metres, `(n, 2)` each.
+
+    Raises
+    ------
+    ConfigError
+        There are fewer than four points, all or all but one lie on a line, the horizon runs between
+        them, or they do not fit together.
+    """
+    if len(pixels) < 4:
+        raise ConfigError(f"camera.ground: has {len(pixels)} points; must be at least four")
+    if (length := _length(metres)) < _MIN_LENGTH:
+        fault = f"all points are within {length:.2g} m; metres are expected, not degrees"
+        raise ConfigError(f"camera.ground: {fault}")
+    metres = metres - np.round(
+        metres.mean(axis=0), -3
+    )  # origins may be thousands of kilometres away
+    straight = undistorter.points(pixels)
+    for points, unit in ((straight, "pixel"), (metres, "metres")):
+        if any(_is_thin(np.delete(points, row, axis=0)) for row in range(len(points))):
+            raise ConfigError(
+                f"camera.ground: all points, or all but one, are on a line ({unit}); add corners"
+            )
+    to_pixels, _ = cv2.findHomography(metres, straight)
+    inverse = np.linalg.inv(to_pixels) if to_pixels is not None else np.zeros((3, 3))
+    depths = straight @ inverse[2, :2] + inverse[2, 2]
+    if not (np.all(depths > 0) or np.all(depths < 0)):
+        raise ConfigError("camera.ground: the horizon is between the points; two may be swapped")
+    to_metres = np.asarray(inverse * np.sign(depths[0]), np.float64)
+    off = _lengths(_mapped(to_metres, straight) - metres)
+    back = np.asarray(np.linalg.inv(to_metres), np.float64)
+    pixel_off = _lengths(_mapped(back, metres) - straight)
+    area = cv2.convexHull(metres.astype(np.float32))[:, 0].astype(np.float64)
+    error, pixel_error = (float(np.sqrt(np.mean(item**2))) for item in (off, pixel_off))
+    if error > _MAX_ERROR * _length(area):
+        worst = int(np.argmax(pixel_off))
+        raise ConfigError(
+            f"camera.ground[{worst}]: is {off[worst]:.1f} m from where the other points place it"
+        )
+    rows = _mapped(to_metres, straight + np.array((0, 1))) - _mapped(to_metres, straight)
+    row = float(np.median(_lengths(rows)))
+    return Ground(to_metres, area, error, pixel_error, row, undistorter)
+
+
+def _mapped(matrix: Float64Array, points: Float64Array) -> Float64Array:
+    """Apply a homography to points `(n, 2)`; NaN where its last row is not positive."""
+    moved = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(moved[:, :2] / np.where(moved[:, 2:] > 0, moved[:, 2:], np.nan))
+
+
+def _is_thin(points: Float64Array) -> bool:
+    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(lengths[1] <= _THIN * lengths[0])
+
+
+def _lengths(vectors: Float64Array) -> Float64Array:
+    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+
+
+def _length(points: Float64Array) -> float:
+    return float(np.max(_lengths(points[:, None] - points)))

@@ -1,6 +1,4 @@
-"""The lane and its lines, from frame to frame.
-
-The lines of a lane: their paint in the top view, and the curves that are fitted to it.
+"""The lane in the frames of a video: the paint of its lines, their curves, positions on the road.
 
 A painted line has the same width at all distances in the top view. A pixel counts as paint if it
 is lighter or yellower than the road a little to its left *and* a little to its right. At the edge
@@ -21,8 +19,6 @@ The curves are linear in their five parameters, except for two products with the
 guess takes the place of the other factor. Every painted row has the same weight. Normal equations
 of several frames can be added, so earlier frames count with less weight and need no second fit.
 
-The road in the frames of a video: its lane, positions on it, and their drawings.
-
 `RoadFinder.observe` does the work that needs one frame only. `RoadFinder.update` takes the frames
 in order: it fits the lane near the last one, or finds a new one, and smooths it over time.
 """
@@ -38,26 +34,13 @@ import numpy as np
 from vdet.boxes import Box, Float64Array, Image
 from vdet.config.scene import LensSettings
 from vdet.config.schema import LaneSettings
-from vdet.draw.boxes import Color, Surface, draw_label, draw_lines, line_width, shade
+from vdet.draw import Color, Surface, draw_label, draw_lines, line_width, shade
 from vdet.lanes.camera import ACROSS, ALONG, Maps, TopView, Undistorter, warped
 from vdet.media import Picture
 from vdet.media.images import to_ycrcb
 
 LinePositions = tuple[Float64Array, Float64Array]
 """x of the left and of the right line at each row of the top view, metres, each `(rows,)`."""
-
-
-@dataclass(frozen=True, slots=True)
-class LinePaint:
-    """Paint that may belong to one line: its distances and lateral positions, metres `(n,)`."""
-
-    z: Float64Array
-    x: Float64Array
-    visible: float = 1.0
-    """Fraction of all rows in which no vehicle hides the line."""
-    pixels: int = 0
-    """Number of painted pixels of the top view."""
-
 
 PAINT, HIDDEN = 255, 128
 """Values of a mask of paint: paint, and what a vehicle hides; the rest is 0."""
@@ -83,6 +66,72 @@ _BASE = 15.0
 """Length of the nearest part of the road, which the histogram covers, metres."""
 _WINDOW = 3.0
 """Length of a sliding window, metres."""
+
+_MIN_SCALE = 0.3  # the pitch of a real vehicle keeps the scale above this
+_PITCH = 4  # index of the pitch among the five parameters, in the order of `LaneCurves`
+
+# Prior knowledge: how many painted rows (deviation 0.1 m) a typical deviation counts as.
+_BEND_WEIGHT = (0.1 / 0.001) ** 2
+_PITCH_WEIGHT = (0.1 / 0.003) ** 2
+_WIDTH_WEIGHT = (0.1 / 0.2) ** 2
+_MIN_WEIGHT = 1e-3  # keeps the equations solvable
+_APART = np.array([0, 0, -1, 1, 0])  # the width, from the five parameters
+_PRIOR = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WEIGHT])
+_PRIOR += _WIDTH_WEIGHT * np.outer(_APART, _APART)
+
+_MIN_VISIBLE = 0.25
+"""Visible fraction of a line below which it needs no less paint: a little can be anything."""
+_MARKING = 4.0
+"""Shortest length of paint by which a wholly visible line is seen, metres."""
+_SCATTER = 0.08
+"""Largest root mean square distance of paint from its curve, metres."""
+_BESIDE, _ALONE = 0.75, 0.85
+"""Distance to each side, metres, and minimum fraction of the paint up to there that is on the line:
+it is 0.9 to 1 on painted lines, and less on verges, crossings and reflections.
+"""
+_CONVERGENCE = 1.6
+"""Maximum convergence of the lines over the top view, metres; it comes from the vehicle's pitch."""
+_MIN_RADIUS = 150.0
+"""Smallest radius of a bend, metres."""
+_JUMP = 0.35
+"""Largest sideways move of a line between two frames, metres."""
+_MEMORY = 0.6
+"""Weight of the frames before, where the newest frame has weight 1."""
+
+Equations = Float64Array
+"""Normal equations of a least-squares fit of `LaneCurves`, `(5, 6)`: the matrix, and the vector in
+the last column."""
+
+CARRY = 12
+"""Number of frames for which a line is kept that is not seen."""
+_CURVE_MEMORY = 0.95
+"""Weight of the earlier frames in the radius that is shown."""
+_STRAIGHT = 5000.0
+"""Radius from which the road counts as straight, metres."""
+_LINE_POINTS = 24  # of each line of a `Lane`
+_REACH = 1.25
+"""Farthest reported vehicle, as a multiple of the distance up to which the lane is fitted."""
+_MAX_ROW_ERROR = 0.1
+"""Maximum relative error of a distance for an error of one row; it is larger near the horizon."""
+_LANES = 3
+"""Number of lanes to each side of the camera's lane that are reported."""
+
+AREA: Color = (80, 200, 60)
+LINE: Color = (40, 60, 255)
+_OPACITY = 0.3
+_SCALE = 2  # top views are small, so their pictures are enlarged
+
+
+@dataclass(frozen=True, slots=True)
+class LinePaint:
+    """Paint that may belong to one line: its distances and lateral positions, metres `(n,)`."""
+
+    z: Float64Array
+    x: Float64Array
+    visible: float = 1.0
+    """Fraction of all rows in which no vehicle hides the line."""
+    pixels: int = 0
+    """Number of painted pixels of the top view."""
 
 
 def paint_mask(luma: Image, blue: Image) -> Image:
@@ -201,38 +250,6 @@ def slide_windows(mask: Image, top_view: TopView, base: tuple[float, float]) -> 
     return positions[0], positions[1]
 
 
-_MIN_SCALE = 0.3  # the pitch of a real vehicle keeps the scale above this
-_PITCH = 4  # index of the pitch among the five parameters, in the order of `LaneCurves`
-
-# Prior knowledge: how many painted rows (deviation 0.1 m) a typical deviation counts as.
-_BEND_WEIGHT = (0.1 / 0.001) ** 2
-_PITCH_WEIGHT = (0.1 / 0.003) ** 2
-_WIDTH_WEIGHT = (0.1 / 0.2) ** 2
-_MIN_WEIGHT = 1e-3  # keeps the equations solvable
-_APART = np.array([0, 0, -1, 1, 0])  # the width, from the five parameters
-_PRIOR = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WEIGHT])
-_PRIOR += _WIDTH_WEIGHT * np.outer(_APART, _APART)
-
-_MIN_VISIBLE = 0.25
-"""Visible fraction of a line below which it needs no less paint: a little can be anything."""
-_MARKING = 4.0
-"""Shortest length of paint by which a wholly visible line is seen, metres."""
-_SCATTER = 0.08
-"""Largest root mean square distance of paint from its curve, metres."""
-_BESIDE, _ALONE = 0.75, 0.85
-"""Distance to each side, metres, and minimum fraction of the paint up to there that is on the line:
-it is 0.9 to 1 on painted lines, and less on verges, crossings and reflections.
-"""
-_CONVERGENCE = 1.6
-"""Maximum convergence of the lines over the top view, metres; it comes from the vehicle's pitch."""
-_MIN_RADIUS = 150.0
-"""Smallest radius of a bend, metres."""
-_JUMP = 0.35
-"""Largest sideways move of a line between two frames, metres."""
-_MEMORY = 0.6
-"""Weight of the frames before, where the newest frame has weight 1."""
-
-
 @dataclass(frozen=True, slots=True)
 class LaneCurves:
     """Both lines of a lane: metres to the right, as second-order curves of the distance ahead."""
@@ -268,11 +285,6 @@ class LaneCurves:
 def pitch_scale(z: Float64Array, pitch: float) -> Float64Array:
     """Return how much larger than without pitch a width appears at distances `(n,)`."""
     return np.maximum(1 - pitch * z, _MIN_SCALE)
-
-
-Equations = Float64Array
-"""Normal equations of a least-squares fit of `LaneCurves`, `(5, 6)`: the matrix, and the vector in
-the last column."""
 
 
 def normal_equations(left: LinePaint, right: LinePaint, guess: LaneCurves) -> Equations:
@@ -383,21 +395,6 @@ def _is_seen(paint: LinePaint, around: LinePaint, top_view: TopView, x: Float64A
         return False
     distance = paint.x - np.interp(-paint.z, -top_view.distances, x)
     return float(np.sqrt(np.mean(distance**2))) <= _SCATTER
-
-
-CARRY = 12
-"""Number of frames for which a line is kept that is not seen."""
-_CURVE_MEMORY = 0.95
-"""Weight of the earlier frames in the radius that is shown."""
-_STRAIGHT = 5000.0
-"""Radius from which the road counts as straight, metres."""
-_LINE_POINTS = 24  # of each line of a `Lane`
-_REACH = 1.25
-"""Farthest reported vehicle, as a multiple of the distance up to which the lane is fitted."""
-_MAX_ROW_ERROR = 0.1
-"""Maximum relative error of a distance for an error of one row; it is larger near the horizon."""
-_LANES = 3
-"""Number of lanes to each side of the camera's lane that are reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -621,12 +618,6 @@ def _advance(state: _LaneState, fit: FrameFit | None) -> _LaneState | None:
     if max(unseen) > CARRY or not joined.curves.contain_camera:
         return None
     return _LaneState(joined, unseen, curvature)
-
-
-AREA: Color = (80, 200, 60)
-LINE: Color = (40, 60, 255)
-_OPACITY = 0.3
-_SCALE = 2  # top views are small, so their pictures are enlarged
 
 
 def draw_lane(surface: Surface, lane: Lane) -> None:

@@ -30,6 +30,11 @@ _MATRICES: dict[int, Literal["bt601", "bt709"]] = {1: "bt709", 2: "bt601", 5: "b
 MATRIX_CODES = {"bt601": 6, "bt709": 1}
 """The codes to write."""
 
+_16_BITS = ("gray16", "ya16", "rgb48", "rgba64")
+"""Prefixes of pixel formats with 16 bits, as in PNG and TIFF."""
+
+UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
+
 
 def _table(old_zero: float, new_zero: float, step: float) -> Image:
     """Return a lookup table that maps `old_zero` to `new_zero` and a step of 1 to `step`."""
@@ -38,6 +43,8 @@ def _table(old_zero: float, new_zero: float, step: float) -> Image:
 
 
 _TO_FULL_RANGE = _table(16, 0, 255 / 219), _table(128, 128, 255 / 224)
+
+
 _TO_LIMITED_RANGE = _table(0, 16, 219 / 255), _table(128, 128, 224 / 255)
 """Tables for luma and for chroma."""
 
@@ -97,6 +104,8 @@ def _from_rgb(matrix: str) -> Float64Array:
 
 
 _FROM_BT709 = _from_rgb("bt601") @ np.linalg.inv(_from_rgb("bt709"))
+
+
 _TO_BT709 = np.linalg.inv(_FROM_BT709)
 
 
@@ -303,10 +312,6 @@ def _part(image: Image, box: Float64Array) -> Image:
     return image[y : max(round(y2), y + 1), x : max(round(x2), x + 1)]
 
 
-_16_BITS = ("gray16", "ya16", "rgb48", "rgba64")
-"""Prefixes of pixel formats with 16 bits, as in PNG and TIFF."""
-
-
 def bgr_of(picture: "av.VideoFrame") -> Image:
     """Return a decoded picture as BGR uint8 `(H, W, 3)`.
 
@@ -319,9 +324,6 @@ def bgr_of(picture: "av.VideoFrame") -> Image:
         return from_16_bits(picture.to_ndarray(format="bgr48le", threads=1).astype(np.uint16))
     image = np.asarray(picture.to_ndarray(format="bgr24", threads=1), np.uint8)
     return image.copy() if picture.format.name == "bgr24" else np.ascontiguousarray(image)
-
-
-UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,6 +50,12 @@ log = logging.getLogger("vdet")
 
 _TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_CLOCKWISE}
 
+_PATTERN = re.compile(r"([^%]*)%(?:0([1-9]\d*))?d([^%]*)", re.ASCII)
+_NUMBERED = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
+_DIGITS = re.compile(r"(\d+)", re.ASCII)
+ASSUMED_RATE = Fraction(25)
+"""Images per second, if the settings do not determine it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
@@ -255,13 +261,6 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
     # cv2.split fails if the garbage collector sees its unfinished tuple in another thread.
     luma, red, blue = (np.asarray(cv2.extractChannel(both, n), np.uint8) for n in range(3))
     return luma, red, blue
-
-
-_PATTERN = re.compile(r"([^%]*)%(?:0([1-9]\d*))?d([^%]*)", re.ASCII)
-_NUMBERED = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
-_DIGITS = re.compile(r"(\d+)", re.ASCII)
-ASSUMED_RATE = Fraction(25)
-"""Images per second, if the settings do not determine it."""
 
 
 def numbered_images(path: Path) -> tuple[Path, ...]:

@@ -19,13 +19,30 @@ from av.video.reformatter import ColorRange
 
 from vdet.config.schema import OutputSettings, Settings
 from vdet.errors import OutputError, VideoError
-from vdet.media.demux import PLAYED_AUDIO, SAFELY, Decoder, Demuxer, codec_name
 from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Frame, VideoInfo
 from vdet.media.images import is_image_name
-from vdet.media.reader import VideoReader
+from vdet.media.reader import PLAYED_AUDIO, SAFELY, Decoder, Demuxer, VideoReader, codec_name
 from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
+
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
+
+_X264 = "b-adapt=0:scenecut=0:b-pyramid=none"
+"""Parameters of x264: no search of later frames for scene cuts and frame types, which would take a
+tenth of a run and save 1 % of the file size; and no B-frames as references, for fewer frames in
+memory: files are 2 % larger.
+"""
+_AAC_RATE = 48_000
+"""Samples a second of audio whose own rate AAC does not have."""
+_MARKED = "made by vdet"
+MARK = f"{_MARKED} {__version__}"
+"""Comment in the metadata of every video that vdet writes."""
+_MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
+_FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
+
+_AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may still follow
+_MOST_REORDERED = 17  # frames in H.264 and H.265, and one
 
 
 class AudioCopy:
@@ -128,22 +145,6 @@ class AudioCopy:
                 frame.pts -= round(self._origin / frame.time_base)
                 if frame.pts >= 0:
                     yield from self._streams[packet.stream_index].encode(frame)
-
-
-VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
-
-_X264 = "b-adapt=0:scenecut=0:b-pyramid=none"
-"""Parameters of x264: no search of later frames for scene cuts and frame types, which would take a
-tenth of a run and save 1 % of the file size; and no B-frames as references, for fewer frames in
-memory: files are 2 % larger.
-"""
-_AAC_RATE = 48_000
-"""Samples a second of audio whose own rate AAC does not have."""
-_MARKED = "made by vdet"
-MARK = f"{_MARKED} {__version__}"
-"""Comment in the metadata of every video that vdet writes."""
-_MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
-_FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 
 
 def is_marked(path: Path) -> bool:
@@ -315,10 +316,6 @@ class VideoWriter:
         if info.coding.full_range:
             context.color_range = ColorRange.JPEG
         return stream
-
-
-_AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may still follow
-_MOST_REORDERED = 17  # frames in H.264 and H.265, and one
 
 
 def can_be_copied(source: Path) -> bool:

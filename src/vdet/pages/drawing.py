@@ -13,6 +13,7 @@ from markupsafe import Markup
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, is_chosen
 from vdet.config.loading import in_pixels
+from vdet.config.scene import APPROACHES
 from vdet.config.schema import Settings
 from vdet.findings import Finding
 from vdet.media.images import encode_image
@@ -22,7 +23,6 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import VehiclePath, lines_and_zones, link_tracks
-from vdet.traffic.measures import APPROACHES
 
 _SECTIONS = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
 """The lists that the page edits, and their section in the settings file."""

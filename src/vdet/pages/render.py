@@ -22,7 +22,7 @@ import cv2
 from markupsafe import Markup, escape
 
 from vdet.boxes import Image
-from vdet.draw.boxes import Color
+from vdet.draw import Color
 from vdet.errors import clock_text, escaped, quantity
 from vdet.media.images import shrunk
 from vdet.version import __version__

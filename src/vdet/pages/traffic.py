@@ -11,11 +11,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from vdet import draw
 from vdet.boxes import Image
 from vdet.config.scene import TrafficSettings
 from vdet.config.schema import Settings
-from vdet.draw import boxes
-from vdet.draw.boxes import Color, Surface
+from vdet.draw import Color, Surface
 from vdet.errors import ConfigError, clock_text
 from vdet.media.images import read_image
 from vdet.pages.render import Plot, Table, interval_plot, render, time_axis
@@ -120,7 +120,7 @@ def traffic_marks(
         if len(path) > 1:
             arrow = DrawnMark(
                 path,
-                color=boxes.color_of(number),
+                color=draw.color_of(number),
                 width=max(2, round(_WIDEST * size[0] * len(trips) / maximum)),
                 label=str(len(trips)),
                 at=path[len(path) // 2],
@@ -147,7 +147,7 @@ def _inside(path: Sequence[Point], size: tuple[int, int]) -> list[Point]:
 def direction_color(start: Point, end: Point) -> Color:
     """Return the colour of the direction from one point to another."""
     angle = math.atan2(end[1] - start[1], end[0] - start[0])
-    return boxes.of_hue(angle / (2 * math.pi), 0.8)
+    return draw.of_hue(angle / (2 * math.pi), 0.8)
 
 
 def border_marks(
@@ -159,20 +159,20 @@ def border_marks(
     traffic, and without labels over one another.
     """
     height = border.size[1]
-    width = boxes.line_width(np.empty((int(height), 0), np.uint8))
+    width = draw.line_width(np.empty((int(height), 0), np.uint8))
     if not isinstance(border, Line):
         top = min(border.corners, key=lambda corner: corner[1])
-        yield DrawnMark(border.corners, boxes.ZONE, width, border.name + text, top, is_closed=True)
+        yield DrawnMark(border.corners, draw.ZONE, width, border.name + text, top, is_closed=True)
         return
     (ax, ay), (bx, by) = border.start, border.end
     middle = (ax + bx) / 2, (ay + by) / 2
-    yield DrawnMark((border.start, border.end), boxes.LINE, width, border.name, middle)
+    yield DrawnMark((border.start, border.end), draw.LINE, width, border.name, middle)
     left = (by - ay) / border.length, (ax - bx) / border.length
     ends, reaches = (border.start, border.end), (_SIDE * height, -_SIDE * height)
     for (x, y), reach, direction in zip(ends, reaches, border.directions, strict=True):
         tip = x + reach * left[0], y + reach * left[1]
         number = "" if totals is None else f" {totals.get((border.name, direction), 0)}"
-        yield DrawnMark(((x, y), tip), boxes.LINE, width, direction + number, tip, is_arrow=True)
+        yield DrawnMark(((x, y), tip), draw.LINE, width, direction + number, tip, is_arrow=True)
 
 
 def draw_marks(surface: Surface, marks: Iterable[DrawnMark]) -> None:
@@ -180,17 +180,17 @@ def draw_marks(surface: Surface, marks: Iterable[DrawnMark]) -> None:
     drawn = list(marks)
     for mark in drawn:
         if mark.is_closed:
-            boxes.shade(surface, mark.points, mark.color, _SHADE)
-        boxes.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
+            draw.shade(surface, mark.points, mark.color, _SHADE)
+        draw.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
         if mark.is_arrow:
             end, length = mark.points[-1], max(3 * mark.width, _TIP * surface.shape[1])
             points = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
             start = next(points, mark.points[0])
             tip = length / max(length, math.dist(start, end))
-            boxes.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
+            draw.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
     for mark in drawn:
         if mark.label:
-            boxes.draw_label(surface, mark.label, mark.at, mark.color)
+            draw.draw_label(surface, mark.label, mark.at, mark.color)
 
 
 def with_marks(image: Image, marks: Iterable[DrawnMark]) -> Image:

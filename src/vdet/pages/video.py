@@ -11,9 +11,9 @@ from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN
-from vdet.config.rendering import render_settings
+from vdet.config.loading import render_settings
 from vdet.config.schema import Settings
-from vdet.draw.boxes import color_of, text_color
+from vdet.draw import color_of, text_color
 from vdet.errors import plural
 from vdet.files import write_text
 from vdet.findings import Finding

@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 from markupsafe import Markup
 
+from vdet import draw
 from vdet.boxes import Box, Image
 from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.scene import TrafficSettings
 from vdet.config.schema import Settings
-from vdet.draw import boxes
 from vdet.files import valid_text
 from vdet.findings import Finding
 from vdet.media import Picture, VideoInfo
@@ -465,10 +465,10 @@ class ReviewRecorder:
         band, box = self._strips[number].band, tracks[-1].box
         scale = small.shape[1] / image.shape[1]
         feet = [track.foot for track in tracks]
-        for points, color in (((band.start, band.end), boxes.LINE), (feet, boxes.GREEN)):
-            boxes.draw_lines(small, [(scale * x, scale * y) for x, y in points], color, 1)
+        for points, color in (((band.start, band.end), draw.LINE), (feet, draw.GREEN)):
+            draw.draw_lines(small, [(scale * x, scale * y) for x, y in points], color, 1)
         corners = (scale * side for side in (box.x1, box.y1, box.x2, box.y2))
-        boxes.draw_box(small, Box(*corners), boxes.GREEN)
+        draw.draw_box(small, Box(*corners), draw.GREEN)
         return small
 
     def _reduced(self, image: Image, width: int, largest: float) -> Image:

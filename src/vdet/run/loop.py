@@ -43,8 +43,7 @@ from vdet.run.steps import (
     make_steps,
 )
 from vdet.run.threads import SearchThreads
-from vdet.track.factory import ShotTracker, make_tracker, timed
-from vdet.track.track import TimedTracker, VideoTracker
+from vdet.track.track import ShotTracker, TimedTracker, VideoTracker, make_tracker, timed
 
 _INTERVALS = 25
 """Number of the latest frame intervals whose trimmed mean is the usual interval."""

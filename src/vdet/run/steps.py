@@ -21,7 +21,7 @@ import cv2
 from vdet.boxes import Box, Boxes, Image, has_moved
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
-from vdet.draw.boxes import color_of, draw_box
+from vdet.draw import color_of, draw_box
 from vdet.errors import ConfigError
 from vdet.findings import Findings
 from vdet.media import Frame, VideoInfo

@@ -34,8 +34,8 @@ from vdet.run.steps import FINDINGS, Fact, Facts, FrameResult, findings_in
 from vdet.run.threads import read_async
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, check_intervals, find_clock
+from vdet.traffic.counter import LiveTraffic, source_video
 from vdet.traffic.counts import Corrected, Counts
-from vdet.traffic.live import LiveTraffic, source_video
 from vdet.traffic.records import VehicleRecord
 from vdet.workers import core_count
 

@@ -1,8 +1,4 @@
-"""The rules tracker: the rules of the original system.
-
-A car of the original system, and the regions in which it is detected.
-
-The rules tracker, which follows cars from frame to frame by rules 1 to 17.
+"""The rules tracker: cars are followed from frame to frame by rules 1 to 17 of the original.
 
 Where the description of the original system can be read in two ways, this is the choice:
 

@@ -24,11 +24,11 @@ The counts of a video depend only on its tracks (`FrameTracks`), live or from a 
    vehicle can. A moving vehicle that is lost and not found again continues for 0.3 seconds.
 9. Only events are stored. All totals, flows and stays are computed from them.
 
-`linking` joins the tracks of each vehicle to a path. `crossings` has the lines and zones in
-the frame, and computes the crossings of one path and one line or zone, without state. `counter`
-collects the events while frames are processed, and `counting` those of saved tracks; `seams` says
-how one file follows another. `counts` has the events and the tables computed from them, `clock` the
-start time of a video and the intervals of all tables and pages, and `output` the files of counts
-and flows. `survey` has the tables of the workbook, which `workbook` writes, and `measures` the peak
-hours and turning movements in them.
+`crossings` joins the tracks of each vehicle to a path, has the lines and zones in the frame, and
+computes the crossings of one path and one line or zone, without state. `counter` collects the
+events while frames are processed, and `counting` those of saved tracks, also of files that follow
+one another. `counts` has the events and the tables computed from them, `clock` the start time of a
+video and the intervals of all tables and pages, and `output` the files. `records` has a record and
+the best image of each vehicle, `speeds` its speeds. `survey` has the tables of the workbook, which
+`workbook` writes.
 """

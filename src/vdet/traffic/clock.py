@@ -29,6 +29,25 @@ OVERRIDE = "input.begin overrides it"
 _CREATED = "its creation time"
 _EXPORTED, _FUTURE = f"{_CREATED}, perhaps of an export", f"{_CREATED}, in the future"
 
+Span = tuple[float, float]
+"""Start and end of a time span, seconds; of a part with video, its first and last frame."""
+
+ClockTime = datetime | float | None
+"""A clock time; without a clock, seconds in the video; None for several videos without one."""
+
+GAP = 2.0
+"""Maximum seconds between two times of one span, in `joined`."""
+_LONGEST_FRAME = 60.0
+"""Maximum duration of a frame, seconds; a later next frame means a part without video."""
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+SEAM = 2.0
+"""Maximum seconds by the clocks from the last frame of a video to the first of the next one, if
+that continues it: clocks of whole seconds differ by up to one, and so long may a frame last.
+"""
+_MAX_COUNT = 200_000
+"""Maximum number of intervals: two days of seconds."""
+
 
 @dataclass(frozen=True, slots=True)
 class Clock:
@@ -167,18 +186,6 @@ def _time_text(time: datetime) -> str:
     return time.isoformat(" ", "seconds")
 
 
-Span = tuple[float, float]
-"""Start and end of a time span, seconds; of a part with video, its first and last frame."""
-
-ClockTime = datetime | float | None
-"""A clock time; without a clock, seconds in the video; None for several videos without one."""
-
-GAP = 2.0
-"""Maximum seconds between two times of one span, in `joined`."""
-_LONGEST_FRAME = 60.0
-"""Maximum duration of a frame, seconds; a later next frame means a part without video."""
-
-
 def add_frame(spans: list[Span], frame: FrameTracks, before: FrameTracks | None) -> None:
     """Extend the last span to a frame, or begin a new one if there is no video before it.
 
@@ -210,15 +217,6 @@ def when(spans: Sequence[Span]) -> str:
     first, last = max(spans, key=lambda span: span[1] - span[0])
     more = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
     return f"from {clock_text(int(first))} to {clock_text(int(last))}{more}"
-
-
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-SEAM = 2.0
-"""Maximum seconds by the clocks from the last frame of a video to the first of the next one, if
-that continues it: clocks of whole seconds differ by up to one, and so long may a frame last.
-"""
-_MAX_COUNT = 200_000
-"""Maximum number of intervals: two days of seconds."""
 
 
 def check_intervals(length: int | None, spans: Iterable[Span]) -> None:

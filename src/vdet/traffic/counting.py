@@ -1,12 +1,9 @@
-"""Counts of files of tracks, and of the seams between them.
+"""Count in saved tracks of one video, or of several of one camera that may follow one another.
 
-Which part of a video the next one shows again, by the vehicles in both.
-
-Clocks say how long two videos overlap, but most have whole seconds. Vehicles that move say it to a
-frame: the next video is laid over the end of the one before at each time that the clocks allow, and
-where the vehicles of both are nearest, it begins.
-
-Count in saved tracks of one video, or of several of one camera that may follow one another.
+Which part of a video the next one shows again is seen by the vehicles in both. Clocks say how long
+two videos overlap, but most have whole seconds. Vehicles that move say it to a frame: the next
+video is laid over the end of the one before at each time that the clocks allow, and where the
+vehicles of both are nearest, it begins.
 """
 
 import logging
@@ -27,7 +24,7 @@ from vdet.errors import ConfigError, TruthError
 from vdet.findings import Finding, at_places, with_counted, without
 from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.labels.reading import read_head, read_tracks
-from vdet.lanes.ground import ground_of
+from vdet.lanes.camera import ground_of
 from vdet.progress import Advance
 from vdet.regions import Regions
 from vdet.track.track import FrameTracks
@@ -46,6 +43,17 @@ _SAMPLES = 8
 """Maximum number of moments that are compared."""
 _SEAM_STEP = 0.1
 """Minimum seconds between two frames that are not the same moment."""
+
+_log = logging.getLogger("vdet")
+
+_MIN_GAP = 0.1
+"""Minimum seconds of a gap by two clocks with fractions of a second, and of an overlap."""
+_STEP = 0.04
+"""Assumed duration of the only frame of a video, seconds."""
+_LONGEST_STEP = 1.0
+"""Maximum duration of the last frame of a video, seconds."""
+_GOPRO = re.compile(r"(?<![a-z0-9])g(?:opr|[a-z](\d\d))(\d{4})(?!\d)", re.IGNORECASE)
+"""Chapter and number of a recording: GX020017 continues GX010017, and GP010017 GOPR0017."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,18 +155,6 @@ def _fits_better(before: MovingVehicles, after: MovingVehicles, distance: float)
     """Return whether vehicles are nearer in an overlap than if the next video began at the end."""
     at_end = _distances(before.at(float(before.times[-1])), after.at(float(after.times[0])))
     return not len(at_end) or float(at_end.mean()) > distance + _MOVED
-
-
-_log = logging.getLogger("vdet")
-
-_MIN_GAP = 0.1
-"""Minimum seconds of a gap by two clocks with fractions of a second, and of an overlap."""
-_STEP = 0.04
-"""Assumed duration of the only frame of a video, seconds."""
-_LONGEST_STEP = 1.0
-"""Maximum duration of the last frame of a video, seconds."""
-_GOPRO = re.compile(r"(?<![a-z0-9])g(?:opr|[a-z](\d\d))(\d{4})(?!\d)", re.IGNORECASE)
-"""Chapter and number of a recording: GX020017 continues GX010017, and GP010017 GOPR0017."""
 
 
 def natural_order(path: Path) -> list[tuple[str, int]]:

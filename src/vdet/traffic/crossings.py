@@ -1,10 +1,7 @@
-"""The paths of vehicles, and where they cross lines and borders.
+"""The paths of vehicles, and where they cross lines and the borders of zones.
 
-Links tracks to the paths of vehicles: rule 8 of `vdet.traffic`.
-
-Lines and zones in pixels of the frames, and the crossings of a whole path.
-
-`vdet.traffic` explains the rule.
+Tracks are linked to the paths of vehicles (rule 8 of `vdet.traffic`). Lines and zones lie in pixels
+of the frames, and the crossings of a border follow from a whole path.
 """
 
 import math
@@ -61,6 +58,19 @@ _COLUMNS = 10
 number of the frame, key of the track, x2 and y2 of the box.
 """
 _ROW = Struct(f"{_COLUMNS}d")
+
+ENTER, EXIT, APPEAR, VANISH = ZONE_DIRECTIONS
+
+_INSIDE = 0.01
+"""Points outside the frame are moved this far inside, pixels."""
+_SETTLED = 0.1
+"""Seconds outside the band of a border after which a vehicle has settled on a side."""
+_BAND = 0.05
+"""Distance from a border within which a vehicle is on neither side, in heights of its box."""
+_MIN_BAND = 0.003
+"""Minimum of this distance, as a fraction of the frame's height."""
+
+_Size = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -349,20 +359,6 @@ def _velocity(rows: "array[float]") -> complex:
     weights = 0.5 ** np.arange(len(steps), 0, -1)
     weights[0] *= 2
     return complex(*(weights @ (steps[:, 1:] / steps[:, :1])))
-
-
-ENTER, EXIT, APPEAR, VANISH = ZONE_DIRECTIONS
-
-_INSIDE = 0.01
-"""Points outside the frame are moved this far inside, pixels."""
-_SETTLED = 0.1
-"""Seconds outside the band of a border after which a vehicle has settled on a side."""
-_BAND = 0.05
-"""Distance from a border within which a vehicle is on neither side, in heights of its box."""
-_MIN_BAND = 0.003
-"""Minimum of this distance, as a fraction of the frame's height."""
-
-_Size = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

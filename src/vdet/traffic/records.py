@@ -17,8 +17,8 @@ from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
 from vdet.traffic.crossings import path_moves
+from vdet.traffic.output import VIDEO, is_json, plain_time, write_content
 from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
-from vdet.traffic.tables import VIDEO, is_json, plain_time, write_content
 
 PATH_STEP = 0.01
 """Minimum distance between points of a path, as a fraction of the frame's width.
@@ -41,6 +41,12 @@ Motion = Literal["drove", "standing", "unknown"]
 """Whether a vehicle moved, as seen by a still camera; "unknown": it did not, but was shown for less
 than a minute.
 """
+
+_PADDING = 0.1  # margin around a vehicle, as a fraction of the width and height of its box
+_MIN_SIDE = 24  # minimum side of a box that gets an image, pixels
+
+_Merit = tuple[bool, float]
+"""Whether the frame shows the whole vehicle; its area in pixels times its score."""
 
 
 @dataclass(slots=True)
@@ -298,13 +304,6 @@ def _item(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
         **{name: row[name] for name in columns[end:]},
         **({"corrected": list(record.corrected)} if record.corrected else {}),
     }
-
-
-_PADDING = 0.1  # margin around a vehicle, as a fraction of the width and height of its box
-_MIN_SIDE = 24  # minimum side of a box that gets an image, pixels
-
-_Merit = tuple[bool, float]
-"""Whether the frame shows the whole vehicle; its area in pixels times its score."""
 
 
 @dataclass(frozen=True, slots=True)

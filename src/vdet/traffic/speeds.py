@@ -24,7 +24,7 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.findings import Finding
-from vdet.lanes.ground import Ground
+from vdet.lanes.camera import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
 

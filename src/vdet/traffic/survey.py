@@ -1,4 +1,8 @@
-"""The tables of a survey, for its workbook and its pages."""
+"""The tables of a survey, for its workbook and its pages, with the measures of traffic engineers.
+
+The peak hour and its factor are those of the Highway Capacity Manual: the four successive quarters
+of an hour with the most vehicles, and their number divided by four times that of the busiest.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -8,11 +12,10 @@ from itertools import chain, product
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.config.scene import NOWHERE
+from vdet.config.scene import APPROACHES, NOWHERE, Approach, LineSettings
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, quantity
 from vdet.traffic import counts as tables
-from vdet.traffic import measures
 from vdet.traffic.clock import SEAM, ClockTime, Interval, Intervals
 from vdet.traffic.counts import (
     Counts,
@@ -50,6 +53,14 @@ turning movement: N left is from the northern arm of the junction to the left. f
 it was only seen to leave by this arm.
 checks: the true number of passages at all checked lines and zones, with its interval of 95 %.
 counted: by vdet. corrected, all vehicles: by reviewers. estimated: by checked spans."""
+
+QUARTER = 900
+"""Seconds."""
+HEAVY = "truck", "bus"
+"""The classes of heavy vehicles."""
+HEAVY_NAMED = "of 101 trucks that it found on unseen cameras, the shipped network named 56 right"
+"""How far to trust their share; docs/accuracy.md says how it was measured."""
+MOVEMENTS = "left", "through", "right", "U-turn"
 
 
 class Survey:
@@ -121,7 +132,7 @@ class Survey:
             "interval": self.settings.traffic.interval or "the whole time",
             "checked": self._checked(),
             "conditions": "; ".join(doubts or ["no doubts", *still]),
-            "heavy share": measures.HEAVY_NAMED if len(self._classes) > 1 else None,
+            "heavy share": HEAVY_NAMED if len(self._classes) > 1 else None,
             "program": f"vdet {__version__}",
         }
         rows = [fact for fact in facts.items() if fact[1] is not None]
@@ -151,7 +162,7 @@ class Survey:
         """Yield the volumes of groups; None stands for all flows."""
         whole, quarters = self.groups.tally(groups), None
         with suppress(ConfigError):  # there is no clock
-            quarters = self.groups.tally(groups, measures.QUARTER)
+            quarters = self.groups.tally(groups, QUARTER)
         before = self._before
         for key in keys:
             events = chain.from_iterable(groups.values()) if key is None else groups[key]
@@ -211,7 +222,7 @@ class Survey:
         total, units = tally.numbers[number, key, None], self.settings.traffic.pcu
         cells: list[Cell] = [total, tables.per_hour(total, (period or self._whole).observed)]
         if len(numbers) > 1:
-            heavy = sum(numbers.get(name, 0) for name in measures.HEAVY)
+            heavy = sum(numbers.get(name, 0) for name in HEAVY)
             cells += [*numbers.values(), round(100 * heavy / total, 1) if total else None]
         if units:
             cells.append(sum(count * units.get(name, 1.0) for name, count in numbers.items()))
@@ -220,17 +231,17 @@ class Survey:
     def _movements(self) -> SheetTable:
         """Return how vehicles turn, by interval; the arms are clockwise from the north."""
         lines = self.settings.traffic.lines
-        arm_of, exits = {line.name: line.approach for line in lines}, measures.exits(lines)
-        arms = [arm for arm in measures.APPROACHES if arm in arm_of.values()]
-        turns = product(arms, (*measures.MOVEMENTS, _ALL))
+        arm_of, ways_out = {line.name: line.approach for line in lines}, exits(lines)
+        arms = [arm for arm in APPROACHES if arm in arm_of.values()]
+        turns = product(arms, (*MOVEMENTS, _ALL))
         turning: dict[tuple[str, ...], list[GroupedEvent]] = {turn: [] for turn in turns}
         for (first, last), trips in self.groups.flows.items():
             origin, destination = arm_of.get(first), arm_of.get(last or NOWHERE)
             if origin and destination:
-                turning[origin, measures.movement(origin, destination)] += trips
+                turning[origin, movement(origin, destination)] += trips
                 turning[origin, _ALL] += trips
             for trip in trips if origin and not last else ():
-                is_exit = (first, trip.event.direction) in exits
+                is_exit = (first, trip.event.direction) in ways_out
                 ends = ("unknown", "to", origin) if is_exit else (origin, "to", "unknown")
                 turning.setdefault(("from", *ends), []).append(trip)
         tally = self.groups.tally(turning, self.settings.traffic.seconds)
@@ -332,13 +343,17 @@ def _interval(row: ZoneRow | Interval) -> list[Cell]:
 
 
 def _peak_hour(quarters: Tally[Key] | None, key: Key | None) -> list[Cell]:
-    """Return the cells below `_PEAK`."""
-    peak = None
-    if quarters:
-        periods = quarters.intervals.periods
-        numbers = {period.number: quarters.numbers[period.number, key, None] for period in periods}
-        peak = measures.peak_hour(periods, numbers)
-    return [_time(peak.start), peak.vehicles, peak.factor] if peak else [None] * len(_PEAK)
+    """Return the cells below `_PEAK`, which are empty if no hour is observed completely."""
+    most, cells = 0, list[Cell]([None] * len(_PEAK))
+    periods = quarters.intervals.periods if quarters else ()
+    for hour in zip(periods, periods[1:], periods[2:], periods[3:], strict=False):
+        numbers = [quarters.numbers[quarter.number, key, None] for quarter in hour if quarters]
+        is_complete = hour[3].number - hour[0].number == 3 * QUARTER
+        is_complete = is_complete and not any(quarter.is_part for quarter in hour)
+        if is_complete and sum(numbers) > most:
+            most = sum(numbers)
+            cells = [_time(hour[0].start), most, round(most / (4 * max(numbers)), 2)]
+    return cells
 
 
 def _speeds(events: Iterable[GroupedEvent]) -> list[Cell]:
@@ -369,3 +384,29 @@ def _seam(before: Interval | None, file: Interval) -> str | None:
     if abs(gap) <= SEAM:
         return "continues"
     return f"gap of {gap:.0f} s" if gap > 0 else f"begins {-gap:.0f} s before its end"
+
+
+def exits(lines: Iterable[LineSettings]) -> set[tuple[str, str]]:
+    """Return the directions, with the names of the lines, that lead out of a junction.
+
+    A vehicle leaves by an arm if it goes away from the middle of the lines of all arms.
+    """
+    arms = [line for line in lines if line.approach]
+    ends = [(np.divide(arm.start, arm.size), np.divide(arm.end, arm.size)) for arm in arms]
+    middle = np.mean(ends, axis=(0, 1)) if arms else None
+    found = set()
+    for arm, (start, end) in zip(arms, ends, strict=True):
+        (x, y), (to_x, to_y) = end - start, middle - start
+        side = x * to_y - y * to_x  # of the middle; y runs down, so right is positive
+        if side:
+            found.add((arm.name, arm.left if side > 0 else arm.right))
+    return found
+
+
+def movement(origin: Approach, destination: Approach) -> str:
+    """Return how a vehicle goes from an arm of a junction to another: one of `MOVEMENTS`."""
+    eighths = (APPROACHES.index(destination) - APPROACHES.index(origin)) % len(APPROACHES)
+    left, through, right, u_turn = MOVEMENTS
+    if eighths in (0, 4):
+        return through if eighths else u_turn
+    return left if eighths < 4 else right

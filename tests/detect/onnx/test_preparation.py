@@ -11,8 +11,7 @@ from vdet.boxes import Float64Array
 from vdet.detect.onnx.network import InputForm
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import demo_scene
+from vdet.synthetic import Renderer, demo_scene
 
 ROAD = Renderer(demo_scene(1, width=1280, height=720)).image(200)
 FORMS = pytest.mark.parametrize("dtype", [np.uint8, np.float32], ids=["ours", "others"])

@@ -11,8 +11,7 @@ from vdet.detect.detectors import load_detector
 from vdet.detect.onnx.detector import SHIPPED, NetworkDetector
 from vdet.detect.onnx.network import Session, recognize
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer, must_be_found, true_boxes
-from vdet.synthetic.scene import demo_scene
+from vdet.synthetic import Renderer, demo_scene, must_be_found, true_boxes
 from vdet.testing import check_detector
 
 MAX_BYTES = 2_500_000

@@ -10,8 +10,7 @@ from vdet.config.schema import NetworkSettings
 from vdet.detect.detectors import load_detector
 from vdet.detect.onnx.water import WIDTH, is_wet
 from vdet.media import Picture
-from vdet.synthetic.render import Renderer, must_be_found, true_boxes
-from vdet.synthetic.scene import demo_scene
+from vdet.synthetic import Renderer, demo_scene, must_be_found, true_boxes
 
 FRAME = 40
 

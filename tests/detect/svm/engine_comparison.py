@@ -12,11 +12,9 @@ from seed import SEED
 from vdet.boxes import Float32Array, Image
 from vdet.config.kinds import FeatureSettings, WindowSettings
 from vdet.detect.svm.model import LinearModel, describe, resize, split
-from vdet.detect.svm.search import DenseSearch, FramePyramid
-from vdet.detect.svm.windows import WindowGrid, band_grid
+from vdet.detect.svm.windows import DenseSearch, FramePyramid, WindowGrid, band_grid
 from vdet.media import Picture, Planes
-from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import demo_scene
+from vdet.synthetic import Renderer, demo_scene
 
 Exact = npt.NDArray[np.float64]
 

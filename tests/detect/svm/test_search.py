@@ -34,8 +34,15 @@ from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmDetector
 from vdet.detect.svm.model import BoxRegression, LinearModel, describe, resize, split
-from vdet.detect.svm.search import DenseSearch, FramePyramid
-from vdet.detect.svm.windows import WINDOW_SIDES, FrameStrip, WindowGrid, Windows, window_grids
+from vdet.detect.svm.windows import (
+    WINDOW_SIDES,
+    DenseSearch,
+    FramePyramid,
+    FrameStrip,
+    WindowGrid,
+    Windows,
+    window_grids,
+)
 from vdet.errors import FrameSizeError
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from vdet.boxes import Image, Int32Array
 from vdet.config.kinds import FeatureSettings, PerspectiveSettings, WindowSettings
 from vdet.detect.svm.windows import WindowGrid, band_grid, find_horizon, perspective_grids
-from vdet.synthetic.render import frames
-from vdet.synthetic.scene import PinholeCamera, demo_scene, empty_road
+from vdet.synthetic import PinholeCamera, demo_scene, empty_road, frames
 
 ROWS = 2000  # of a frame that is higher than all bands here
 

@@ -21,8 +21,7 @@ from vdet.learn.svm.mining import (
     compare_windows,
     mine,
 )
-from vdet.synthetic.render import write_truth
-from vdet.synthetic.scene import Scene
+from vdet.synthetic import Scene, write_truth
 from vdet.track.track import Track
 
 WIDTH = 1000

@@ -21,8 +21,7 @@ from running import names
 from vdet.config.schema import ClipSettings
 from vdet.errors import OutputError
 from vdet.files import OutputFiles
-from vdet.media.demux import Demuxer
-from vdet.media.reader import VideoReader
+from vdet.media.reader import Demuxer, VideoReader
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import check_sinks
 from vdet.run.steps import FrameResult

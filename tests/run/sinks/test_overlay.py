@@ -13,7 +13,7 @@ from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box, Image
 from vdet.config.scene import LensSettings
 from vdet.config.schema import DrawSettings, LaneSettings, Settings
-from vdet.draw.boxes import color_of, draw_box
+from vdet.draw import color_of, draw_box
 from vdet.lanes.road import Lane, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
 from vdet.media.frame import Coding, Planes

@@ -5,7 +5,7 @@ import pytest
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
-from vdet.track.motion.association import take_over_ids, without_duplicates
+from vdet.track.motion.tracker import take_over_ids, without_duplicates
 from vdet.track.motion.vehicle import FrameStep, Observation, TrackedVehicle, whole_box
 
 SIZE = (1000, 500)

@@ -10,11 +10,10 @@ import pytest
 from track.motion.scenes import HEIGHT, RATE, WIDTH, detections
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
-from vdet.draw.boxes import Color
+from vdet.draw import Color
 from vdet.media import Picture
 from vdet.media.frame import Coding, Planes
-from vdet.track.motion.association import appearances, differences
-from vdet.track.motion.tracker import MotionTracker
+from vdet.track.motion.tracker import MotionTracker, appearances, differences
 
 RED, WHITE, SILVER, GREY, BLUE = (
     (40, 30, 180), (230, 230, 230), (175, 172, 170), (95, 95, 95), (150, 70, 30),

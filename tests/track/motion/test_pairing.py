@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from scipy.optimize import linear_sum_assignment
 
 from vdet.boxes import Float64Array
-from vdet.track.motion.association import assign, buffered_iou, pair
+from vdet.track.motion.tracker import assign, buffered_iou, pair
 
 EXPECTED = np.array([[100.0, 100, 200, 160], [400, 100, 450, 150]])
 BESIDE = np.array([[210.0, 100, 310, 160]])

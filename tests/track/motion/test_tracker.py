@@ -21,8 +21,7 @@ from track.motion.scenes import (
 )
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
-from vdet.track.motion.association import PART
-from vdet.track.motion.tracker import MotionTracker
+from vdet.track.motion.tracker import PART, MotionTracker
 
 CAR = Box.sized(400, 400, 100, 70)
 DEFAULTS = MotionTrackerSettings()

@@ -24,7 +24,7 @@ from vdet.boxes import (
 from vdet.config.classes import standard_class
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.network import COCO, Recognized, Session, recognize
-from vdet.draw.boxes import GREEN, draw_box
+from vdet.draw import GREEN, draw_box
 from vdet.errors import ModelError, printable
 from vdet.media import Picture
 
@@ -40,10 +40,8 @@ _SAME_IOU = 0.5
 _BOTH = 1.65
 """Odds of a box that both searches found, as a multiple of the mean odds of the two."""
 
-
 Candidates = tuple[Sequence[Boxes], bool]
 """The boxes of each search before suppression, and whether it was of a single image."""
-
 
 _FOUR_WHEELED = "car", "truck", "bus", "vehicle"
 _MAX_HEIGHT, _MAX_CUT_HEIGHT = 1.8, 5.0

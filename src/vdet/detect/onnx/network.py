@@ -28,6 +28,33 @@ MAX_BYTES = 500_000_000
 _OTHER_FORMS = {".xml": "OpenVINO", ".pt": "PyTorch", ".tflite": "TensorFlow Lite"}
 _SILENT = 4  # log level of onnxruntime, because every error is also raised
 
+_MAX_FINAL_ROWS = 1000
+_NORMALISED = 2.0  # pixels of the input: boxes that all end nearer to the corner are fractions
+_USUAL_SIZE = 640, 640  # for exports with a dynamic input size
+
+COCO = tuple(Path(__file__).with_name("coco.txt").read_text("utf-8").splitlines())
+"""The 80 classes of the COCO data set, in the order used by detectors."""
+
+HEADER_KEY = "vdet"
+"""Metadata key of the header."""
+
+STRIDES = (8, 16, 32)
+"""Distance between the cells of each level, pixels of the input."""
+
+Cells = tuple[Float32Array, Float32Array]
+"""Centres `(cells, 2)`, x and y in pixels of the input, and strides `(cells,)` of all cells."""
+
+OutputLayout = Callable[[Array, float], Float32Array]
+"""Converts an output to rows of a box, float32 `(n, 6)` or `(n, 6 + classes)`: x1, y1, x2, y2 in
+pixels of the input, score, class, and the probability of each class if the network outputs it.
+
+Scores below a minimum are dropped, not a NaN; nothing else is checked.
+"""
+
+_MULTIPLE = 32  # of pixels: the stride of the coarsest cells
+GREY = 114
+"""Value of input pixels outside the frame."""
+
 
 class Session:
     """A network ready to run; threads may share it.
@@ -94,17 +121,6 @@ def _in_words(error: Exception) -> str:
     return message.partition("\n")[0][:200]
 
 
-_MAX_FINAL_ROWS = 1000
-_NORMALISED = 2.0  # pixels of the input: boxes that all end nearer to the corner are fractions
-_USUAL_SIZE = 640, 640  # for exports with a dynamic input size
-
-COCO = tuple(Path(__file__).with_name("coco.txt").read_text("utf-8").splitlines())
-"""The 80 classes of the COCO data set, in the order used by detectors."""
-
-HEADER_KEY = "vdet"
-"""Metadata key of the header."""
-
-
 class ScoreCalibration(Section):
     """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
 
@@ -128,21 +144,6 @@ class Header(Section):
     """The calibration of boxes by class; `calibration` for other classes."""
     provenance: dict[str, Any] = Field({})
     """Training data, training settings and metrics."""
-
-
-STRIDES = (8, 16, 32)
-"""Distance between the cells of each level, pixels of the input."""
-
-Cells = tuple[Float32Array, Float32Array]
-"""Centres `(cells, 2)`, x and y in pixels of the input, and strides `(cells,)` of all cells."""
-
-
-OutputLayout = Callable[[Array, float], Float32Array]
-"""Converts an output to rows of a box, float32 `(n, 6)` or `(n, 6 + classes)`: x1, y1, x2, y2 in
-pixels of the input, score, class, and the probability of each class if the network outputs it.
-
-Scores below a minimum are dropped, not a NaN; nothing else is checked.
-"""
 
 
 def vdet_cells(
@@ -204,11 +205,6 @@ def _rows(
         shares = np.nan_to_num(class_scores.astype(np.float32).clip(1e-9, 1))
         columns.append(shares / shares.sum(axis=1, keepdims=True))
     return np.concatenate(columns, axis=1, dtype=np.float32)
-
-
-_MULTIPLE = 32  # of pixels: the stride of the coarsest cells
-GREY = 114
-"""Value of input pixels outside the frame."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,11 +49,56 @@ from vdet.detect.svm.model import (
     resize,
     split,
 )
-from vdet.detect.svm.search import DenseSearch, FramePyramid, vehicle_boxes
-from vdet.detect.svm.windows import DEFAULT_HORIZON, Windows, find_horizon, window_grids
-from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, draw_lines, fill
+from vdet.detect.svm.windows import (
+    DEFAULT_HORIZON,
+    DenseSearch,
+    FramePyramid,
+    Windows,
+    find_horizon,
+    vehicle_boxes,
+    window_grids,
+)
+from vdet.draw import GREEN, WHITE, color_of, draw_box, draw_label, draw_lines, fill
 from vdet.errors import FrameSizeError, ModelError
 from vdet.media import Picture
+
+_BLUR = 15
+"""Side of the Gaussian kernel that blurs the heat, in pixels of `REFERENCE_HEIGHT` rows."""
+_SHRINK = 4
+"""Width and height in pixels of a heat value, with votes; 1 with outlines."""
+
+MAX_VOTES = 400
+"""Maximum number of votes in a group of regions, because time grows with its square."""
+
+_MAX_PROBABILITY = 1 - 2**-24
+"""Limit of probabilities, because the position weight of 1 is infinite."""
+
+_AGREEMENT = 0.35
+"""Minimum intersection over union of two boxes that agree."""
+
+_INSIDE = 0.7
+"""A box with more than this fraction inside a larger vehicle is a part of it."""
+
+_SHARPNESS = 4.0
+"""Exponent of -log(1 - probability) in the `position` weight, so that the best fit counts most."""
+
+_FAR_STRONGER = 4
+"""Minimum ratio of weights for a box inside another one to be kept."""
+
+log = logging.getLogger("vdet")
+
+Candidates = tuple[Windows, bool]
+"""All searched windows, and whether they are from a single image."""
+
+_ALIGNMENT = 16
+"""The searched part begins at a multiple of this many pixels, so that it can be halved like its
+windows.
+"""
+
+_DRAWN = 384
+"""Side of each part of the picture of features, pixels."""
+
+_MODELS = Path(__file__).parents[2] / "models"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +136,6 @@ class HotRegion:
     box: Box
     centroid: tuple[float, float]
     strength: float
-
-
-_BLUR = 15
-"""Side of the Gaussian kernel that blurs the heat, in pixels of `REFERENCE_HEIGHT` rows."""
-_SHRINK = 4
-"""Width and height in pixels of a heat value, with votes; 1 with outlines."""
 
 
 def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSettings) -> Heat:
@@ -152,25 +191,6 @@ def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike)
     offset = (n - 1) / 2  # from the first pixel of a value to their middle
     centroid = (n * moments["m10"] / area + offset, n * moments["m01"] / area + offset)
     return HotRegion(box, centroid, peak)
-
-
-MAX_VOTES = 400
-"""Maximum number of votes in a group of regions, because time grows with its square."""
-
-_MAX_PROBABILITY = 1 - 2**-24
-"""Limit of probabilities, because the position weight of 1 is infinite."""
-
-_AGREEMENT = 0.35
-"""Minimum intersection over union of two boxes that agree."""
-
-_INSIDE = 0.7
-"""A box with more than this fraction inside a larger vehicle is a part of it."""
-
-_SHARPNESS = 4.0
-"""Exponent of -log(1 - probability) in the `position` weight, so that the best fit counts most."""
-
-_FAR_STRONGER = 4
-"""Minimum ratio of weights for a box inside another one to be kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,13 +305,6 @@ def _average(boxes: Float64Array, weights: Float64Array, overlaps: Float64Array)
     return np.asarray(agreeing @ boxes / total)
 
 
-log = logging.getLogger("vdet")
-
-
-Candidates = tuple[Windows, bool]
-"""All searched windows, and whether they are from a single image."""
-
-
 SearchTrace = tuple[Windows, Heat]
 """For the stage images of a frame: the windows with at least `detector.search.probability`, and the
 heatmap of the last frames.
@@ -330,12 +343,6 @@ class SvmModel:
             return DEFAULT_HORIZON
         log.info("the horizon is at %.2f of the height", horizon)
         return horizon
-
-
-_ALIGNMENT = 16
-"""The searched part begins at a multiple of this many pixels, so that it can be halved like its
-windows.
-"""
 
 
 class SvmDetector:
@@ -462,12 +469,6 @@ class SvmDetector:
         large = (boxes.sides[:, 2:] - boxes.sides[:, :2] >= smallest).all(axis=1)
         shown = boxes[large & (boxes.scores >= settings.min_score_still)]
         return shown[~are_nested(shown.sides, shown.data["strength"])]
-
-
-_DRAWN = 384
-"""Side of each part of the picture of features, pixels."""
-
-_MODELS = Path(__file__).parents[2] / "models"
 
 
 def shipped_model(settings: SvmSettings) -> Path:

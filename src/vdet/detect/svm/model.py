@@ -29,6 +29,13 @@ from vdet.media.images import to_ycrcb
 Channels = tuple[Image, Image, Image]
 """Luma, red and blue (YCrCb), uint8 `(H, W)` each; halved channels `(H / 2, W / 2)`."""
 
+FORMAT, FORMAT_VERSION = "vdet model", 2
+MAX_VALUE = 1e9
+"""Maximum absolute value of any number in a model; larger ones could overflow sigmoids."""
+_MAX_BYTES = 64_000_000
+_NAMES = ("weights", "biases", "slopes", "offsets")
+_BOX_NAMES = ("box_weights", "box_biases")
+
 
 def describe(channels: Channels, settings: FeatureSettings) -> Float32Array:
     """Compute the features of one patch from its channels: see `split`.
@@ -104,14 +111,6 @@ def halve(image: Image) -> Image:
     """Return an image of even sides at half its size, each pixel the mean of four."""
     half = (image.shape[1] // 2, image.shape[0] // 2)
     return np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-FORMAT, FORMAT_VERSION = "vdet model", 2
-MAX_VALUE = 1e9
-"""Maximum absolute value of any number in a model; larger ones could overflow sigmoids."""
-_MAX_BYTES = 64_000_000
-_NAMES = ("weights", "biases", "slopes", "offsets")
-_BOX_NAMES = ("box_weights", "box_biases")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

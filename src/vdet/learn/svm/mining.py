@@ -40,6 +40,19 @@ PatchKind = Literal["vehicle", "box", "false alarm", "part"]
 shows only a part of one.
 """
 
+_MAX_COVERED = 0.3
+"""Maximum fraction of a false alarm covered by a vehicle or an ignore region."""
+
+PATCH = 64
+"""Side of the patches, pixels, as in the Udacity set."""
+
+_FOLDERS: dict[PatchKind, str] = {
+    "vehicle": "vehicles/mined_{}",
+    "box": "boxes/mined_{}",
+    "false alarm": "non-vehicles/mined_{}",
+    "part": "non-vehicles/mined_{}_parts",
+}
+
 
 @dataclass(frozen=True, slots=True)
 class MiningLimits:
@@ -58,9 +71,6 @@ class MiningLimits:
 
 
 LIMITS = MiningLimits()
-
-_MAX_COVERED = 0.3
-"""Maximum fraction of a false alarm covered by a vehicle or an ignore region."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,17 +207,6 @@ def _beside(vehicle: Float64Array, frame_width: int) -> BoolArray:
     """Return whether the left and right side of the frame cut off a box `(4,)`, bool `(2,)`."""
     cut = cut_sides(vehicle, (frame_width, math.inf))
     return np.array([cut.left, cut.right])
-
-
-PATCH = 64
-"""Side of the patches, pixels, as in the Udacity set."""
-
-_FOLDERS: dict[PatchKind, str] = {
-    "vehicle": "vehicles/mined_{}",
-    "box": "boxes/mined_{}",
-    "false alarm": "non-vehicles/mined_{}",
-    "part": "non-vehicles/mined_{}_parts",
-}
 
 
 @dataclass(frozen=True, slots=True)

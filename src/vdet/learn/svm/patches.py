@@ -45,6 +45,23 @@ Right and down are positive; NaN for an unknown side, for example outside the fr
 NO_SIDES: Sides = (math.nan, math.nan, math.nan, math.nan)
 """No side is known."""
 
+_Root = Path | zipfile.Path
+"""A folder, or the top of a zip file."""
+
+AddPatch = Callable[[str, Image, Sides | None], None]
+"""Adds a patch (BGR uint8) by name, with the sides of its vehicle."""
+
+TEST_FRACTION = 0.2
+"""Fraction of the patches held out for testing."""
+
+RowNumbers = npt.NDArray[np.intp]
+
+CUT, PART = 0.15, 0.05
+"""Fractions of the patches and their mirror images for cut-off samples, and for parts."""
+
+_CUT_WIDTHS = (0.15, 0.5)  # of the patch's width
+_PART_SIDES = (0.4, 0.6)  # of its width and height
+
 
 @dataclass(frozen=True, slots=True)
 class PatchFile:
@@ -119,10 +136,6 @@ def _numeric(name: str) -> list[tuple[int, str]]:
     return [(len(part) if part.isdecimal() else 0, part) for part in parts]
 
 
-_Root = Path | zipfile.Path
-"""A folder, or the top of a zip file."""
-
-
 def _root_of(source: Path) -> _Root:
     """Return a folder or the top of a zip file."""
     if source.is_dir():
@@ -171,10 +184,6 @@ def _sides(values: Sequence[str]) -> Sides:
     return left, top, right, bottom
 
 
-AddPatch = Callable[[str, Image, Sides | None], None]
-"""Adds a patch (BGR uint8) by name, with the sides of its vehicle."""
-
-
 @contextmanager
 def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
     """Write a zip file of patches as PNG images, with a table of all sides to four decimals.
@@ -203,12 +212,6 @@ def _store(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     info = zipfile.ZipInfo(name)  # of the earliest time
     info.external_attr = 0o644 << 16
     archive.writestr(info, data)
-
-
-TEST_FRACTION = 0.2
-"""Fraction of the patches held out for testing."""
-
-RowNumbers = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -341,13 +344,6 @@ def hold_out(groups: npt.NDArray[np.str_]) -> BoolArray:
         count = min(max(1, round(len(rows) * TEST_FRACTION)), len(rows) - 1)
         held[rows[len(rows) - count :]] = True
     return held
-
-
-CUT, PART = 0.15, 0.05
-"""Fractions of the patches and their mirror images for cut-off samples, and for parts."""
-
-_CUT_WIDTHS = (0.15, 0.5)  # of the patch's width
-_PART_SIDES = (0.4, 0.6)  # of its width and height
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -48,6 +48,9 @@ _BLOCK = 1024  # rows that are scaled at a time
 _CORRECTIONS = 20  # of L-BFGS
 _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 
+THRESHOLD = 0.5
+"""A patch with at least this probability is classified as a vehicle."""
+
 
 def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     """Scale the features, fit a linear SVM, and calibrate it by a sigmoid.
@@ -181,10 +184,6 @@ def fit_sides(hogs: Float32Array, sides: Float32Array) -> BoxRegression:
             weights[side] = ridge.coef_ / spread
             biases[side] = ridge.intercept_
     return BoxRegression(weights, biases)
-
-
-THRESHOLD = 0.5
-"""A patch with at least this probability is classified as a vehicle."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,14 +15,14 @@ from vdet.errors import OutputError
 from vdet.files import json_text, print_now, valid_text, write_text
 from vdet.findings import AT_LINES, without
 from vdet.labels.coco import COCO, write_coco_images
-from vdet.labels.formats import (
+from vdet.labels.images import LabelledImage
+from vdet.labels.label import (
+    SourceVideo,
     TrackWriter,
     check_track_name,
     format_for,
     track_suffixes,
 )
-from vdet.labels.images import LabelledImage
-from vdet.labels.label import SourceVideo
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.sinks.protocol import (
@@ -36,9 +36,9 @@ from vdet.run.sinks.protocol import (
 )
 from vdet.run.steps import findings_in
 from vdet.traffic import output
-from vdet.traffic.live import source_video
+from vdet.traffic.counter import source_video
+from vdet.traffic.output import SUFFIXES, check_table, write_content
 from vdet.traffic.records import join_records, records_content
-from vdet.traffic.tables import SUFFIXES, check_table, write_content
 from vdet.traffic.workbook import write_workbook
 from vdet.version import __version__
 
@@ -49,7 +49,7 @@ MakeContent = Callable[[Path, output.Videos, int | None], Any]
 def write_tracks(path: Path, context: SinkContext) -> Writing:
     """Write the tracks of each frame; the ending of the name selects the format.
 
-    The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
+    The formats are those of `vdet.labels.label`. The path `-` stands for standard output, as
     `.jsonl`, frame by frame. `.jsonl` and `.coco.json` say what the video is (`SourceVideo`), and
     why the tracks may be wrong. In `.jsonl` and `.csv` a frame has its time of day in `clock`, if
     known. In `.jsonl` it has `lane` if lane finding is enabled: null if no lane is shown, else an

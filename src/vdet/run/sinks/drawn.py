@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING
 
 from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.schema import Settings
-from vdet.draw import boxes
-from vdet.draw.boxes import Color, Surface, draw_lines
+from vdet.draw import (
+    GREEN,
+    WHITE,
+    Color,
+    Surface,
+    color_of,
+    draw_box,
+    draw_labels,
+    draw_lines,
+    line_width,
+)
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import IMAGE_SUFFIXES, encode_image
@@ -76,20 +85,20 @@ class Overlay:
         self._trails = {number: points for number, points in kept.items() if points}
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
-            draw_lines(surface, path, self._color(track), boxes.line_width(surface))
+            draw_lines(surface, path, self._color(track), line_width(surface))
 
     def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
         colors = [self._color(track) for track in shown]
         for track, color in zip(shown, colors, strict=True):
-            boxes.draw_box(surface, track.box, color, dashed=track.state == "predicted")
+            draw_box(surface, track.box, color, dashed=track.state == "predicted")
         texts = [[track.label(parts) for parts in self._labels] for track in shown]
-        boxes.draw_labels(surface, [track.box for track in shown], texts, colors)
+        draw_labels(surface, [track.box for track in shown], texts, colors)
 
     def _color(self, track: Track) -> Color:
         if self._draw.colors == "one":
-            return boxes.GREEN
+            return GREEN
         number = track.id if self._draw.colors == "id" else _class_number(track.class_name)
-        return boxes.color_of(number) if number else boxes.WHITE
+        return color_of(number) if number else WHITE
 
 
 def _class_number(name: str | None) -> int:

@@ -10,13 +10,13 @@ from pathlib import Path
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
 from vdet.config.schema import Settings
-from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
+from vdet.draw import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
 from vdet.media import VideoInfo
-from vdet.media.demux import is_pipe, plays_in_some_browser
 from vdet.media.images import encode_image, is_image_name
+from vdet.media.reader import is_pipe, plays_in_some_browser
 from vdet.media.writer import can_be_copied, copy_part, encode_part, is_marked
 from vdet.pages.render import PAGE_NAME, REVIEW_NAME, link_to, thumbnail, webp_uri
 from vdet.pages.video import Player, VideoPage, longest, write_index, write_reviews

@@ -25,7 +25,7 @@ from vdet.run.steps import Fact, FrameResult
 
 if TYPE_CHECKING:  # an image needs no traffic: a tenth of the time of `detect-image`
     from vdet.review.corrections import Corrections
-    from vdet.traffic.live import LiveTraffic
+    from vdet.traffic.counter import LiveTraffic
     from vdet.traffic.records import BestCrops, VehicleRecord
     from vdet.traffic.survey import Survey
 

@@ -1,19 +1,15 @@
-"""A tracked vehicle, and its motion.
+"""A tracked vehicle: its motion, the evidence for it, and its score.
 
-Position and size of a vehicle and their changes: a constant-velocity Kalman filter.
+Position and size and their changes are estimated by a constant-velocity Kalman filter (Kalman, "A
+New Approach to Linear Filtering and Prediction Problems", 1960). The model of nearly constant
+velocity is that of Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and
+Navigation", 2001, section 6.2.2 (white noise acceleration in continuous time). x and y of the
+centre and the logarithms of width and height are four independent filters. All uncertainties are
+fractions of the vehicle's size, so that near and far vehicles, and small and large frames, are
+treated alike; times are in seconds.
 
-Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", 1960; the model of
-nearly constant velocity is that of Bar-Shalom, Li and Kirubarajan, "Estimation with Applications
-to Tracking and Navigation", 2001, section 6.2.2 (white noise acceleration in continuous time).
-
-x and y of the centre and the logarithms of width and height are four independent filters. All
-uncertainties are fractions of the vehicle's size, so that near and far vehicles, and small and
-large frames, are treated alike; times are in seconds.
-
-The filter uses only earlier frames. Later frames then correct its estimates (`History`). Source:
-Rauch, Tung and Striebel, "Maximum Likelihood Estimates of Linear Dynamic Systems", 1965.
-
-One vehicle: its motion, the evidence for it, and its score.
+The filter uses only earlier frames. Later frames then correct its estimates (`History`; Rauch, Tung
+and Striebel, "Maximum Likelihood Estimates of Linear Dynamic Systems", 1965).
 
 The evidence for a vehicle is a running sum that leaks, as in Page, "Continuous Inspection
 Schemes", 1954: detections whose score is below the leak never add up, however long they last.
@@ -43,6 +39,43 @@ _ACCELERATION = 0.8
 
 _VELOCITY = 2.5
 """Standard deviation of a new vehicle's velocity, sizes of the vehicle per second."""
+
+SCORE_TIME = 0.5
+"""Seconds over which the scores of detections are averaged."""
+
+_ENTRY = 0.4
+"""Seconds before its first detection during which an entering vehicle is shown."""
+
+_ENTERING = 0.1
+"""Minimum speed of a vehicle that enters the frame, in its sizes per second."""
+
+_MAX_EVIDENCE_SECONDS = 0.1
+"""Maximum seconds that one frame counts as evidence: a single frame must not be enough."""
+
+_MAX_DOUBT = 0.6
+"""Maximum seconds that detections below the decay keep a vehicle present; at least `coast_seconds`.
+
+In the distance, such weak detections lead from one vehicle to the next.
+"""
+
+_SLOWING_TIME = 0.8
+"""Seconds in which the velocity of a vehicle unseen for over `coast_seconds` falls to 1/e."""
+
+_SETTLING_TIME = 0.4
+"""The same for the change of its size, from the first miss on, because growth adds up quickly."""
+
+_APPEARANCE_TIME = 0.3
+"""Seconds over which the appearance of the detections is averaged."""
+
+_LEAVING = 0.1
+"""Minimum speed of a vehicle that leaves the frame, in its sizes per second."""
+
+_NOISE = 0.12
+"""Standard deviation of the sides of a detection with score 1, as a fraction of the vehicle's size.
+"""
+
+_MIN_SCORE = 0.05
+"""Below this score, the noise of a box does not increase further."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,16 +221,6 @@ def _measured(
     return mean, measured, seen
 
 
-SCORE_TIME = 0.5
-"""Seconds over which the scores of detections are averaged."""
-
-_ENTRY = 0.4
-"""Seconds before its first detection during which an entering vehicle is shown."""
-
-_ENTERING = 0.1
-"""Minimum speed of a vehicle that enters the frame, in its sizes per second."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class StateEstimate:
     """A vehicle after a searched frame.
@@ -341,35 +364,6 @@ def carried(mean: Float64Array, seconds: float) -> Float64Array:
     position = mean[:, 0].copy()
     position[:2] += mean[:2, 1] * seconds
     return position
-
-
-_MAX_EVIDENCE_SECONDS = 0.1
-"""Maximum seconds that one frame counts as evidence: a single frame must not be enough."""
-
-_MAX_DOUBT = 0.6
-"""Maximum seconds that detections below the decay keep a vehicle present; at least `coast_seconds`.
-
-In the distance, such weak detections lead from one vehicle to the next.
-"""
-
-_SLOWING_TIME = 0.8
-"""Seconds in which the velocity of a vehicle unseen for over `coast_seconds` falls to 1/e."""
-
-_SETTLING_TIME = 0.4
-"""The same for the change of its size, from the first miss on, because growth adds up quickly."""
-
-_APPEARANCE_TIME = 0.3
-"""Seconds over which the appearance of the detections is averaged."""
-
-_LEAVING = 0.1
-"""Minimum speed of a vehicle that leaves the frame, in its sizes per second."""
-
-_NOISE = 0.12
-"""Standard deviation of the sides of a detection with score 1, as a fraction of the vehicle's size.
-"""
-
-_MIN_SCORE = 0.05
-"""Below this score, the noise of a box does not increase further."""
 
 
 @dataclass(frozen=True, slots=True)

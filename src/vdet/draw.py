@@ -28,6 +28,23 @@ _HALF = 127
 _FARTHEST = 2**15
 """Pixels from the picture's corner; OpenCV takes no coordinates much larger."""
 
+GREEN: Color = (80, 220, 60)
+WHITE: Color = (255, 255, 255)
+BLACK: Color = (0, 0, 0)
+LINE: Color = (0, 200, 255)
+ZONE: Color = (255, 170, 60)
+RED: Color = (60, 60, 230)
+_GOLDEN_RATIO = 0.618034
+_SMALLEST_TEXT = 0.35
+"""Font scale; smaller digits cannot be read."""
+_DASH = 4
+"""Length of a dash and of the gap after it, in line widths."""
+_DARK = 0.3
+"""Brightness outside the regions."""
+
+_BETTER = 0.1
+"""Fraction of a label that may be hidden, or hide, before it moves."""
+
 
 def fill(surface: Surface, box: Box, color: Color) -> None:
     """Fill the part of a box that lies in the surface."""
@@ -149,25 +166,6 @@ def _coded(color: Color, coding: Coding) -> list[tuple[int]]:
     """Return luma, blue and red chroma of a colour."""
     planes = Planes.of_image(np.full((2, 2, 3), color, np.uint8), coding)
     return [(int(layer[0, 0]),) for layer in planes.layers]
-
-
-GREEN: Color = (80, 220, 60)
-WHITE: Color = (255, 255, 255)
-BLACK: Color = (0, 0, 0)
-LINE: Color = (0, 200, 255)
-ZONE: Color = (255, 170, 60)
-RED: Color = (60, 60, 230)
-_GOLDEN_RATIO = 0.618034
-_SMALLEST_TEXT = 0.35
-"""Font scale; smaller digits cannot be read."""
-_DASH = 4
-"""Length of a dash and of the gap after it, in line widths."""
-_DARK = 0.3
-"""Brightness outside the regions."""
-
-
-_BETTER = 0.1
-"""Fraction of a label that may be hidden, or hide, before it moves."""
 
 
 def color_of(number: int) -> Color:

@@ -1,1 +1,0 @@
-"""Boxes, labels and lines, drawn into BGR images or planes."""
