@@ -18,7 +18,7 @@ from vdet.boxes import Image
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import LaneSettings, Settings
 from vdet.detect.detectors import load_detector
-from vdet.evaluate.report import table
+from vdet.evaluate.results import table
 from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Frame, Picture
 from vdet.run.steps import LaneStep, with_positions

@@ -23,7 +23,7 @@ from benchmarks.material import find_video
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import OutputSettings, Settings
 from vdet.detect.detectors import as_model
-from vdet.evaluate import report
+from vdet.evaluate import results
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.loop import Parts
@@ -148,7 +148,7 @@ def table(samples: Sequence[Sample]) -> list[str]:
         values = f"{_speed(before, now):.1f}", f"{now.memory:.0f}", f"{now.peak:.0f}"
         rows.append((str(now.frames), *values, str(now.files), str(now.threads)))
     headings = "frames", "frames/s", "memory MB", "peak MB", "files", "threads"
-    return report.table(headings, rows)
+    return results.table(headings, rows)
 
 
 def loop_video(source: Path, target: Path, frames: int) -> None:

@@ -28,8 +28,16 @@ from vdet.config.schema import NetworkSettings
 from vdet.detect.detectors import DetectorModel, load_detector
 from vdet.detect.onnx.detector import NetworkDetector
 from vdet.detect.onnx.network import ScoreCalibration, Session, read_header
-from vdet.evaluate.report import RunName, figure, table, video_report
-from vdet.evaluate.results import Counting, best_f1, evaluate_images, evaluate_video
+from vdet.evaluate.results import (
+    Counting,
+    RunName,
+    best_f1,
+    evaluate_images,
+    evaluate_video,
+    figure,
+    table,
+    video_report,
+)
 from vdet.evaluate.scores import MATCH_IOU, ComparedFrame, RankedPredictions, pool
 from vdet.files import json_text, write_whole
 from vdet.labels.images import LabelledImages

@@ -11,7 +11,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
-from vdet.evaluate.report import table
+from vdet.evaluate.results import table
 from vdet.evaluate.scores import score
 from vdet.files import make_folder, write_whole
 from vdet.labels.reading import read_tracks, read_truth

@@ -10,23 +10,21 @@ from labels.saving import Row, checked_video, row
 from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
 from vdet.boxes import Box, Boxes
-from vdet.evaluate.report import (
+from vdet.evaluate.results import (
     DETECTED,
     TRUE,
-    RunName,
-    images_report,
-    mistake_tiles,
-    tracks_report,
-    video_report,
-    worst_tiles,
-)
-from vdet.evaluate.results import (
     ClipResult,
     Counting,
     ImagesResult,
     MeasuredImage,
     MeasuredSet,
+    RunName,
+    images_report,
+    mistake_tiles,
     score_files,
+    tracks_report,
+    video_report,
+    worst_tiles,
 )
 from vdet.evaluate.scores import compare
 from vdet.labels.reading import read_labelled_images

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from vdet.evaluate.report import Report, Tile
+from vdet.evaluate.results import Report, Tile
 from vdet.files import write_text
 from vdet.pages.render import link_to
 

@@ -17,8 +17,8 @@ from vdet.findings import Finding
 from vdet.pages.traffic import page_table
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Corrected, Correction, Counts, Estimate, Event, VehicleGroup
+from vdet.traffic.output import Sheet, SheetTable, write_workbook
 from vdet.traffic.survey import HEAVY_NAMED, Survey, movement
-from vdet.traffic.workbook import Sheet, SheetTable, write_workbook
 from vdet.version import __version__
 
 LINES = {"north": "N", "east": "E", "south": "S"}
@@ -362,7 +362,7 @@ def test_turns_are_seen_from_the_arm_of_entry() -> None:
 
 
 def test_a_sheet_that_is_full_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vdet.traffic.workbook._LAST_ROW", 3)
+    monkeypatch.setattr("vdet.traffic.output._LAST_ROW", 3)
     rows = [[n] for n in range(9)]
     write_workbook(tmp_path / "c.xlsx", [Sheet("many", [SheetTable(["n"], rows)])])
     assert lines_of(tmp_path / "c.xlsx")["many"] == [

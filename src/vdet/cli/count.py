@@ -128,8 +128,13 @@ def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image
     """Write a table, a workbook or a page; `scene` is the picture of the settings."""
     from vdet.pages.render import PAGE_NAME
     from vdet.pages.traffic import counts_page, scene_picture
-    from vdet.traffic.output import counts_content, flows_content, is_workbook, write_content
-    from vdet.traffic.workbook import write_workbook
+    from vdet.traffic.output import (
+        counts_content,
+        flows_content,
+        is_workbook,
+        write_content,
+        write_workbook,
+    )
 
     traffic = survey.settings.traffic
     if scene is not None:
@@ -146,7 +151,7 @@ def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of all files, and of each file if one has no clock."""
-    from vdet.evaluate.report import table
+    from vdet.evaluate.results import table
     from vdet.traffic.counts import direction_totals
 
     totals = {}
@@ -176,7 +181,7 @@ def _estimated(estimate: "Estimate | None") -> str:
 
 def _matrix(videos: "Sequence[Counts]") -> list[str]:
     """Return the flows between lines and zones over all files; empty if there is only one."""
-    from vdet.evaluate.report import table
+    from vdet.evaluate.results import table
     from vdet.traffic.output import flow_matrix
 
     matrix = flow_matrix(videos)

@@ -12,7 +12,7 @@ from vdet.workers import core_count
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
-    from vdet.evaluate.report import RunName
+    from vdet.evaluate.results import RunName
 
 
 @command()
@@ -42,8 +42,7 @@ def images(
     settings = source.load()
     options.reject_regions(settings)
     from vdet.detect.detectors import load_detector
-    from vdet.evaluate.report import images_report
-    from vdet.evaluate.results import Counting, evaluate_images
+    from vdet.evaluate.results import Counting, evaluate_images, images_report
     from vdet.labels.reading import Roles, read_labelled_images
 
     detector = load_detector(settings.detector.showing_all())
@@ -76,8 +75,7 @@ def tracks(
     Examples:
       vdet eval tracks out.txt gt.txt --page page
     """
-    from vdet.evaluate.report import tracks_report
-    from vdet.evaluate.results import score_files
+    from vdet.evaluate.results import score_files, tracks_report
 
     results.check(source.inputs(prediction, truth))
     settings = source.load()
@@ -114,8 +112,7 @@ def video(
     labelled = options.with_truths(videos, truths)
     settings = source.load()
     from vdet.detect.detectors import load_detector
-    from vdet.evaluate.report import video_report
-    from vdet.evaluate.results import evaluate_video
+    from vdet.evaluate.results import evaluate_video, video_report
     from vdet.labels.reading import Roles, read_truth
 
     detector = load_detector(settings.detector)
@@ -156,7 +153,7 @@ def counts(events: Path, truth: Path, results: ResultFiles) -> None:
 def _run_name(settings: "Settings", source: SettingsSource) -> "RunName":
     """Return a description of the detector that is measured."""
     from vdet.detect.detectors import model_file
-    from vdet.evaluate.report import RunName
+    from vdet.evaluate.results import RunName
 
     detector, configs = settings.detector, " ".join(source.configs) or None
     return RunName(detector.kind, model_file(detector), configs, source.changes)

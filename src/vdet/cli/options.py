@@ -18,7 +18,7 @@ from vdet.run.sinks import Output
 if TYPE_CHECKING:
     from vdet.config.loading import Document
     from vdet.config.schema import Settings
-    from vdet.evaluate.report import Report
+    from vdet.evaluate.results import Report
 
 Function = Callable[..., Any]
 """A function that becomes a command."""

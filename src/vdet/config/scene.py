@@ -6,11 +6,10 @@ frames at hand.
 
 import re
 from collections import Counter
-from collections.abc import Iterable
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 from zoneinfo import ZoneInfo
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
@@ -31,6 +30,8 @@ Name = Annotated[str, Field(min_length=1, max_length=80)]
 Approach = Literal["N", "NE", "E", "SE", "S", "SW", "W", "NW"]
 APPROACHES: tuple[Approach, ...] = get_args(Approach)
 """The arms of a junction, clockwise from the north."""
+
+Shapes = TypeVar("Shapes", bound="tuple[RegionSettings | LineSettings | ZoneSettings, ...]")
 
 FRACTIONS = 1, 1
 """The size of points that are fractions of the frame."""
@@ -90,8 +91,8 @@ class Shape(Section):
         return self.model_copy(update={**points, "size": (width, height)})
 
 
-def check_shapes(shapes: Iterable["RegionSettings | LineSettings | ZoneSettings"]) -> None:
-    """Raise a `ValueError` if two shapes have one name, or a point is not in the frame."""
+def checked_shapes(shapes: Shapes) -> Shapes:
+    """Return shapes; raise a `ValueError` if two have one name, or a point is not in the frame."""
     seen: set[str] = set()
     for shape in shapes:
         if shape.name in seen:
@@ -104,6 +105,7 @@ def check_shapes(shapes: Iterable["RegionSettings | LineSettings | ZoneSettings"
                 f"{shape.name}: a point is outside the frame; points are in pixels of "
                 "camera.size, or without it in fractions of the frame"
             )
+    return shapes
 
 
 def _check_polygon(points: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -138,13 +140,8 @@ class RegionSettings(Shape):
         return self
 
 
-def _check_regions(regions: tuple[RegionSettings, ...]) -> tuple[RegionSettings, ...]:
-    check_shapes(regions)
-    return regions
-
-
 RegionList = Annotated[
-    tuple[RegionSettings, ...], Field(max_length=MAX_SHAPES), AfterValidator(_check_regions)
+    tuple[RegionSettings, ...], Field(max_length=MAX_SHAPES), AfterValidator(checked_shapes)
 ]
 
 
@@ -264,7 +261,7 @@ class TrafficSettings(Section):
 
     @model_validator(mode="after")
     def _lie_in_the_frame(self) -> "TrafficSettings":
-        check_shapes(self.shapes)
+        checked_shapes(self.shapes)
         columns = [f"{name}: {way}" for name, ways in self.directions.items() for way in ways]
         if NOWHERE in self.directions:
             raise ValueError(f"{NOWHERE}: is reserved for flows without a destination; rename it")

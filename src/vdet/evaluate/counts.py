@@ -9,7 +9,7 @@ from typing import Any
 from vdet.config.classes import UNKNOWN
 from vdet.config.loading import Document, validated
 from vdet.errors import TruthError
-from vdet.evaluate.report import figure, table
+from vdet.evaluate.results import figure, table
 from vdet.review.correcting import judge
 from vdet.review.corrections import Corrections, ReviewedEvent
 from vdet.traffic.counts import Counts, Event, class_of

@@ -120,11 +120,6 @@ DEFAULT_ROLES = Roles.from_settings(Settings())
 """The roles of the default settings."""
 
 
-def is_region(label: str | None) -> bool:
-    """Return whether a label marks a region, not a single object."""
-    return label is not None and letters(label) in _REGION_LETTERS
-
-
 def read_tracks(path: Path, rate: float | None = None, size: Size | None = None) -> SavedTracks:
     """Read the tracks of a video from a file in any format; ignore regions are omitted.
 
@@ -148,7 +143,8 @@ def read_tracks(path: Path, rate: float | None = None, size: Size | None = None)
     gc.disable()  # labels have no cycles, and looking for some takes a quarter of the time
     try:
         saved = recognize(path, data).read(path, data)
-        regions = set(filter(is_region, {track.class_name for track in saved.tracks}))
+        names = {track.class_name for track in saved.tracks}
+        regions = {name for name in names if name and letters(name) in _REGION_LETTERS}
         frames = {}
         for index, tracks in saved.frames.items():
             vehicles = [

@@ -22,9 +22,9 @@ from vdet.pages.render import Plot, Table, interval_plot, render, time_axis
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, EventGroups
 from vdet.traffic.crossings import Border, Line, lines_and_zones
+from vdet.traffic.output import Cell, SheetTable
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.survey import Survey
-from vdet.traffic.workbook import Cell, SheetTable
 
 _INTERVAL = 900
 """Seconds of an interval of the chart, unless the settings have one."""

@@ -29,6 +29,5 @@ computes the crossings of one path and one line or zone, without state. `counter
 events while frames are processed, and `counting` those of saved tracks, also of files that follow
 one another. `counts` has the events and the tables computed from them, `clock` the start time of a
 video and the intervals of all tables and pages, and `output` the files. `records` has a record and
-the best image of each vehicle, `speeds` its speeds. `survey` has the tables of the workbook, which
-`workbook` writes.
+the best image of each vehicle, `speeds` its speeds, and `survey` the tables of a workbook.
 """

@@ -28,7 +28,7 @@ from vdet.traffic.counts import (
     names_in,
     seconds_checked,
 )
-from vdet.traffic.workbook import Cell, Sheet, SheetTable
+from vdet.traffic.output import Cell, Sheet, SheetTable
 from vdet.version import __version__
 
 _TIMES = "start", "end", "observed, s", "part"

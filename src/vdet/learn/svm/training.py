@@ -26,7 +26,7 @@ from vdet.boxes import BoolArray, Float32Array, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.errors import DataError
-from vdet.evaluate.report import figure, table
+from vdet.evaluate.results import figure, table
 from vdet.learn.svm.patches import LabelledVectors, PatchFile, extract, hold_out
 from vdet.progress import Progress, no_progress
 from vdet.version import __version__

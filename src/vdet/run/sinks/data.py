@@ -37,9 +37,8 @@ from vdet.run.sinks.protocol import (
 from vdet.run.steps import findings_in
 from vdet.traffic import output
 from vdet.traffic.counter import source_video
-from vdet.traffic.output import SUFFIXES, check_table, write_content
+from vdet.traffic.output import SUFFIXES, check_table, write_content, write_workbook
 from vdet.traffic.records import join_records, records_content
-from vdet.traffic.workbook import write_workbook
 from vdet.version import __version__
 
 MakeContent = Callable[[Path, output.Videos, int | None], Any]

@@ -485,17 +485,12 @@ class TrackedVehicle:
         return self.history.estimates[-1].time - self.begin
 
     @property
-    def has_left(self) -> bool:
-        """Whether a side of the frame cut it off when it was last seen, and it was moving out."""
-        last = self.history.last_seen.state
-        return bool((last.velocity * last.ways_in).min() < -_LEAVING)
-
-    @property
     def is_over(self) -> bool:
         """Whether to forget it."""
         if not self.confirmed:
             return self.evidence <= 0
-        if self.has_left:
+        last = self.history.last_seen.state
+        if (last.velocity * last.ways_in).min() < -_LEAVING:  # a side cut it off, and it moved out
             return self.unseen > self._settings.coast_seconds
         in_the_open = self.unseen - self.hidden
         longest = self._settings.keep_hidden_id_seconds
