@@ -45,18 +45,8 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     run: Run, clips: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    arguments = (
-        "detect-video",
-        clips,
-        "-d",
-        out,
-        "--jobs",
-        "2",
-        "--tracks",
-        ".csv",
-        "--page",
-        ".page",
-    )
+    outputs = ("--tracks", ".csv", "--page", ".page")
+    arguments = ("detect-video", clips, "-d", out, "--jobs", "2", *outputs)
     (clips / "bad.mp4").write_bytes(b"no video")
 
     first = run(*arguments)
@@ -150,35 +140,3 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
     copy = shutil.copy(shipped, tmp_path / "copy.onnx")
     for same in ((), ("--set", "train.net.steps=9"), ("--model", copy)):
         assert "0 files done, 2 skipped, 0 failed" in run(*again, *same).err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (
-            ("-d", "out", "--tracks", "all.txt"),
-            "tracks: with -d, pass only the ending of the names: .txt, .csv, .jso",
-        ),
-        (("-d", "out", "--no-video"), "no output; add one"),
-        (("-d", "out", "--stages", "x", "--at", "1"), "stages: cannot be written with -d"),
-        (("-d", "out", "--overwrite", "--skip-existing"), "cannot be used together"),
-        (
-            ("-d", "out", "--jobs", "2", "--scheduler", "tcp://x:1"),
-            "--jobs and --scheduler cannot be used together",
-        ),
-        (("-d", "out", "--jobs", "0"), "is not in the range"),
-        (("-d", "out", "--start", "2", "--end", "1"), "--end must be later"),
-        (("out.mp4", "--skip-existing"), "require -d"),
-        (("out.mp4", "--jobs", "2"), "require -d"),
-        (("out.mp4", "--scheduler", "tcp://x:1"), "require -d"),
-        (("b.mp4", "c.mp4"), "for several videos a folder: vdet detect-video "),
-    ],
-)
-def test_wrong_usage(
-    run: Run, clips: Path, arguments: tuple[str, ...], words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(clips)
-    result = run("detect-video", clips / "a.mp4", *arguments)
-    assert result.code == 2
-    assert words in result.err
-    assert names(clips) == ["a.mp4", "day2/b.mp4"]

@@ -319,66 +319,13 @@ def test_several_files_are_counted_each_and_together(
     }  # fmt: skip
 
 
-def test_fractions_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
+def test_lines_in_fractions_are_counted_at_in_frames_of_a_given_size(
+    run: Run, tmp_path: Path
+) -> None:
     tracks, lines = write_tracks(tmp_path / "t.csv"), tmp_path / "lines.yaml"
     lines.write_text("traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}")
-    result = run("count", tracks, "-c", lines)
-    assert result.code == 1
-    assert "pass the size of the frames, as in --size 1280x720" in result.err
     result = run("count", tracks, "-c", lines, "--size", "320x240", code=0)
     assert result.out.split()[6:9] == ["gate", "left", "1"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "message"),
-    [
-        (["t.csv"], 2, "no lines or zones to count at; add a settings file with -c FILE"),
-        (["t.csv", "-c", "none.yaml"], 1, "none.yaml: not found"),
-        (["t.csv", "-c", "l.yaml", "--size", "320x200"], 1, "for frames of 320×240"),
-        (["t.csv", "-c", "l.yaml", "--size", "big"], 2, "'big' is not two numbers"),
-        (["t.csv", "-c", "l.yaml", "--counts", "c.txt"], 1, "must end in .csv, .json"),
-        (["t.csv", "-c", "l.yaml", "--counts", "t.csv"], 1, "is an input of this run"),
-        (["t.txt", "-c", "l.yaml"], 1, "has no times; pass the frame rate"),
-        (["none.csv", "-c", "l.yaml"], 1, "none.csv"),
-        (["t.csv", "-c", "short.yaml"], 1, "short.yaml:1:1: traffic: gate: is shorter than 1 %"),
-        (["t.csv", "-c", "l.yaml", "--interval", "7min"], 1, "7min does not divide a day"),
-        (["t.csv", "-c", "l.yaml", "--begin", "now"], 1, "'now' is not a time"),
-        (
-            ["t.csv", "-c", "l.yaml", "--set", "camera.clock.pattern='%Y%m%d'"],
-            1,
-            "t.csv: its name does not match camera.clock.pattern",
-        ),
-        (
-            ["t.csv", "u.csv", "-c", "l.yaml", "--begin", "2026-05-01 07:00"],
-            1,
-            "u.csv: has no clock, and the file before does not say how long its video is; use .jso",
-        ),
-        (["back.csv", "-c", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
-    ],
-)
-def test_mistakes_are_refused(
-    run: Run,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    code: int,
-    message: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write_tracks(Path("t.csv"))
-    write_tracks(Path("u.csv"))
-    Path("t.txt").write_text("1,1,1,1,40,40,1,-1,-1,-1\n")
-    Path("l.yaml").write_text(LINES)
-    Path("short.yaml").write_text(
-        "traffic: {lines: [{name: gate, start: [1, 0.5], end: [0.999, 0.5]}]}"
-    )
-    columns = "frame,time,id,x,y,width,height"
-    Path("back.csv").write_text(f"{columns}\n0,0.08,1,1,1,40,40\n1,0.04,1,1,1,40,40\n")
-    before = sorted(tmp_path.iterdir())
-    result = run("count", *arguments)
-    assert result.code == code
-    assert message in result.err
-    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_each_video_of_a_batch_has_its_counts(
@@ -399,19 +346,6 @@ def test_each_video_of_a_batch_has_its_counts(
         "gate": [0, 1, 0],
         "yard": [0, 0, 0],
     }
-
-
-@pytest.mark.parametrize(
-    "command",
-    [("eval", "images", "pictures"), ("mine", "red.mp4", "--truth", "gt.txt", "-o", "mined.zip")],
-)
-def test_a_command_that_looks_at_whole_frames_refuses_them(
-    run: Run, command: tuple[str, ...]
-) -> None:
-    outline = "points: [[0, 0], [1, 0], [1, 1]]"
-    result = run(*command, "--set", f"regions=[{{name: a, {outline}}}]")
-    assert result.code == 1
-    assert "regions: this command uses whole frames" in result.err
 
 
 def test_the_manifest_of_a_batch_is_skipped(run: Run, tmp_path: Path) -> None:

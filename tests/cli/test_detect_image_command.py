@@ -72,34 +72,6 @@ def test_without_an_output_the_vehicles_are_printed(
         assert row == f"  vehicle  {box['score']:.2f}  {place}"
 
 
-def test_two_inputs_of_one_name(run: Run, picture: Path, tmp_path: Path) -> None:
-    twin = tmp_path / "twin" / picture.name
-    twin.parent.mkdir()
-    twin.write_bytes(picture.read_bytes())
-    result = run("detect-image", picture, twin, "-o", tmp_path / "out")
-    assert result.code == 1
-    assert "is used for two outputs" in result.err
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("-o", "out.png", "--json", "out.png"),
-        ("-o", "out", "--json", "out/road.png"),
-        ("--json", "out.json", "--sink", "json=out.json"),
-    ],
-)
-def test_two_outputs_of_one_name(
-    run: Run, picture: Path, options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(picture.parent)
-    Path("out").mkdir()
-    result = run("detect-image", picture.name, *options, "--overwrite", code=1)
-    assert "is used for two outputs; rename one" in result.err
-    assert sorted(Path().rglob("*")) == [Path("out"), Path(picture.name)]
-
-
 def test_in_a_folder_a_bad_picture_does_not_stop_the_others(
     run: Run, picture: Path, model_path: Path, tmp_path: Path
 ) -> None:

@@ -50,29 +50,6 @@ def test_a_part_of_the_video(run: Run, clip_path: Path, model_path: Path, tmp_pa
     assert _times(tmp_path / "out.mp4") == [Fraction(i, 25) for i in range(10)]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--tracks", "t.csv"), "pass either OUT or --no-video"),
-        (("out.mp4", "--no-video"), "pass either OUT or --no-video"),
-        (("--no-video",), "no output; add one"),
-        (("out.mp4", "--stages", "x"), "--stages and --at must be used together"),
-        (("out.mp4", "--start", "5", "--end", "5"), "--end must be later"),
-        (("out.mp4", "--start", "soon"), "is not a time"),
-        (("out.mp4", "--start", "1:2:3:4"), "is not a time"),
-        (("out.mp4", "--start", "1:-5"), "is not a time"),
-        (("out.mp4", "--start", "1e9"), "is not a time"),
-        (("out.mp4", "--start", "999999999:00:00"), "is not a time"),
-        (("out.mp4", "--frames", "0"), "is not in the range"),
-        (("out.mp4", "--threads", "9" * 30), "is not in the range"),
-    ],
-)
-def test_wrong_usage(run: Run, clip_path: Path, arguments: tuple[str, ...], words: str) -> None:
-    result = run("detect-video", clip_path, *arguments)
-    assert result.code == 2
-    assert words in result.err
-
-
 @pytest.mark.parametrize("more", [(), ("--overwrite",), ("--overwrite", "--frames", "1")])
 def test_a_video_of_another_program_is_kept_and_the_message_shows_the_command_for_several(
     run: Run, tmp_path: Path, more: tuple[str, ...]
@@ -98,23 +75,6 @@ def test_what_vdet_wrote_and_what_is_no_video_is_replaced(
         options = ("--overwrite", "--frames", str(frames))
         run("detect-video", clip_path, out, *options, code=0)
         assert len(_times(out)) == frames
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--at", "50"), "50.00 s is beyond its end; it ends at "),
-        (("--at", "0.2", "--frames", "2"), "no frame at 0.20 s or later"),
-        (("--at", "0", "--start", "50"), "50.00 s is beyond its end; it ends at "),
-    ],
-)
-def test_stages_of_a_time_without_a_frame_are_an_error(
-    options: tuple[str, ...], words: str, run: Run, clip_path: Path, tmp_path: Path
-) -> None:
-    result = run("detect-video", clip_path, "--no-video", "--stages", tmp_path, *options)
-    assert result.code == 1
-    assert f"{clip_path}: {words}" in result.err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_only_reading_decides_whether_a_time_is_beyond_the_end(run: Run, tmp_path: Path) -> None:

@@ -127,25 +127,3 @@ def test_a_picture_has_lines_and_numbers_only_where_no_survey_adds_its_own(run: 
     run("draw", *given, "-o", "place.svg", code=0)
     drawn = Elements(Path("place.svg").read_text("utf-8"))
     assert drawn.text.split() == ["6", "gate", "left", "6", "right", "0"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((), "Missing option '-o'"),
-        (("-o", "a.txt"), "a.txt: outputs must end in .html, .jpg, .png, .svg"),
-        (("-o", "a.svg"), "no lines or zones to count at; add them to the settings"),
-        (("-o", "lines.html", "-c", "wide.yaml"), "whose aspect ratio"),
-        (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),
-        (("-o", "a.html", "--tracks-from", "t.txt"), "t.txt: has no times"),
-    ],
-)
-def test_wrong_use_is_refused(run: Run, arguments: tuple[str, ...], message: str) -> None:
-    Path("wide.yaml").write_text(LINES.replace("240]", "100]").replace("220", "90"))
-    Path("t.txt").write_text("1,1,10,10,20,20,1,-1,-1,-1\n")
-    result = run("draw", "frame.png", *arguments)
-    assert result.code in (1, 2)
-    assert message in result.err
-    assert not {"a.html", "a.jpg", "a.yaml", "lines.html"} & {
-        path.name for path in Path().iterdir()
-    }

@@ -83,28 +83,3 @@ def test_several_sets_a_table_and_a_page(
     for words in (str(sets[0]), str(sets[1]), "mean of 2", "cow (2)"):
         assert words in result.out
     assert "data:image/jpeg" in (folder / "page.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        ((), 2, "Missing argument 'DATA...'"),
-        (("none",), 1, "none: labelled images not found"),
-        (("set", "--min-width", "2"), 2, "2.0 is not in the range"),
-        (("set", "--page", "set/a.png"), 1, "the folder set/a.png is not a folder"),
-        (("set", "--set", "detector.kind=sonar"), 1, "sonar: unknown detector"),
-    ],
-)
-def test_what_cannot_be_is_said_before_any_work(
-    run: Run,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: tuple[str, ...],
-    code: int,
-    words: str,
-) -> None:
-    write_set(tmp_path / "set")
-    monkeypatch.chdir(tmp_path)
-    result = run("eval", "images", *arguments)
-    assert (result.code, result.out) == (code, "")
-    assert words in result.err

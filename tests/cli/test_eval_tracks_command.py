@@ -34,18 +34,3 @@ def test_prints_a_table_and_writes_numbers_and_a_page(
     html = (tmp_path / "page" / "page.html").read_text()
     assert "frames 1–10 compared" in html
     assert f"compared with {truth} by vdet {vdet.__version__}" in html
-
-
-def test_bad_truth_is_an_error_of_one_line(run: Run, found: Path, tmp_path: Path) -> None:
-    bad = tmp_path / "bad.txt"
-    bad.write_text("1,1,1,1,100,100,1,3,1\n1,1,1\n")
-    result = run("eval", "tracks", found, bad)
-    assert (result.code, result.out) == (1, "")
-    assert result.err.startswith(f"vdet: {bad}:2: ")
-    assert result.err.count("\n") == 1
-
-
-def test_regions_are_refused(run: Run, found: Path) -> None:
-    regions = "regions=[{name: a, points: [[0, 0], [1, 0], [1, 1]]}]"
-    result = run("eval", "tracks", found, found, "--set", regions, code=1)
-    assert result.err == "vdet: regions: this command uses whole frames; remove the regions\n"

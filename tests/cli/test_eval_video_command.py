@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import pytest
-
 import vdet
 from conftest import Run
 from quick import QUICK_OPTIONS
@@ -43,30 +41,3 @@ def test_several_videos_have_a_row_each_and_a_total(
     for text in (result.out, html):
         assert f"vdet {vdet.__version__}, detector svm, model {model_path.name}, settings " in text
         assert "total" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        ((), 2, "pass one --truth for each video (videos: 1, truths: 0)"),
-        (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "truths: 2)"),
-        (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
-        (("--truth", "gt.txt", "--set", "detector.features.hog.cell=8"), 1, "no shipped model"),
-    ],
-)
-def test_what_cannot_be_is_said_before_any_work(
-    run: Run, clip_path: Path, truth_path: Path, arguments: tuple[str, ...], code: int, words: str
-) -> None:
-    named = [str(truth_path.with_name(a)) if a.endswith(".txt") else a for a in arguments]
-    result = run("eval", "video", clip_path, "-c", "svm", *named)
-    assert (result.code, result.out) == (code, "")
-    assert words in result.err
-
-
-def test_the_model_must_fit_the_settings(
-    run: Run, clip_path: Path, truth_path: Path, model_path: Path
-) -> None:
-    options = ("--truth", truth_path, "--model", model_path, "--set", "detector.features.patch=48")
-    result = run("eval", "video", clip_path, *options)
-    assert (result.code, result.out) == (1, "")
-    assert "was trained with other features" in result.err

@@ -38,19 +38,6 @@ def test_another_network_says_what_it_was_taken_for(run: Run, tmp_path: Path) ->
     assert "other classes: airplane; train; boat; " in result.out
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("in.mp4", "in.mp4: must be .npz or .onnx; ffprobe describes videos and images"),
-        ("none.onnx", "none.onnx: cannot be"),
-    ],
-)
-def test_what_is_neither_is_an_error(run: Run, tmp_path: Path, name: str, words: str) -> None:
-    result = run("info", tmp_path / name)
-    assert (result.code, result.out) == (1, "")
-    assert words in result.err
-
-
 def test_without_a_file_the_shipped_models_are_loaded(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,12 +24,9 @@ SETS = ", ".join(
     for size, top, bottom in ((40, 400, 500), (80, 380, 520), (160, 360, 600))
 )
 WINDOWS = (
-    "--set",
-    "detector.search.perspective.sizes=[]",
-    "--set",
-    f"detector.search.windows=[{SETS}]",
+    *("--set", "detector.search.perspective.sizes=[]"),
+    *("--set", f"detector.search.windows=[{SETS}]"),
 )
-BELOW = "detector.search.windows=[{size: 80, overlap: 0.875, top: 900, bottom: 990}]"
 NAME = re.compile(r"frame(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
 
@@ -149,34 +146,3 @@ def test_frames_that_cut_a_vehicle_off_are_used_too(
 def _patches(path: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(path) as archive:
         return {name: archive.read(name) for name in archive.namelist() if name != "boxes.csv"}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (("--until", "3", "--from", "4"), 2, "--until must not be before --from"),
-        (("--every", "0"), 2, "--every"),
-        (("--from", "10"), 1, "gt.txt: ends at frame 9; begin earlier"),
-        (("-o", "mined.npz"), 1, "mined.npz: patches must end in .zip"),
-        (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
-        (("--truth", "a.txt", "--truth", "b.txt"), 2, "(videos: 1, truths: 2)"),
-        (("--set", BELOW), 1, "road.mp4: no search window fits into 320×180 pixels"),
-    ],
-)
-def test_what_cannot_be_leaves_nothing_behind(
-    run: Run,
-    clip_path: Path,
-    truth_path: Path,
-    options: tuple[str, ...],
-    tmp_path: Path,
-    arguments: tuple[str, ...],
-    code: int,
-    words: str,
-) -> None:
-    named = [tmp_path / a if a.endswith((".npz", ".txt")) else a for a in arguments]
-    if "--truth" not in arguments:
-        named += ["--truth", truth_path]
-    result = run("mine", clip_path, "-o", tmp_path / "mined.zip", *options, *named)
-    assert (result.code, result.out) == (code, "")
-    assert words in result.err
-    assert not list(tmp_path.iterdir())
