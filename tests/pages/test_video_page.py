@@ -79,139 +79,134 @@ def seen(made: VideoPage) -> Elements:
     return Elements(re.sub(r"(?m)^ *# .*$", "", made.html()))
 
 
-class TestVideoPage:
-    def test_it_loads_nothing_but_the_video_and_its_own_data(self) -> None:
-        addresses = seen(page()).addresses()
-        others = {
-            address.partition("#")[0] for address in addresses if not address.startswith("data:")
-        }
-        assert others == {"../a.mp4"}
+IN_OUT = counted(("north", "in", 1), ("north", "in", 2), ("north", "out", 3))
+CLASSES = zip(IN_OUT.events, ("car", "truck", None), strict=True)
+BY_CLASS = replace(IN_OUT, events=tuple(replace(e, class_name=name) for e, name in CLASSES))
+FLOWS = counted(("north", "in", 1, 1), ("south", "out", 2, 1), ("north", "in", 1, 2))
+SPEEDS = counted(("north", "in", 1, 1, 36.0), ("north", "in", 2, 2, 40.0))
+BY_NAME = counted(*(("north", "in", at) for at in (1, 2, 3)), (NASTY, "in", 1))
+SOURCE = Player("b.mp4", "../b.mp4", is_drawn=False, start=0.0)
+DARK = Finding("dark", "it <was> dark", ((0.5, 1.5),), "warning", 0.3)
+MOVES = replace(DARK, code="camera-moves")
+STOOD = [replace(record, motion="standing") for record in TWO]
+BUS = replace(TWO[0], class_name="bus")
+SHOWN: dict[str, tuple[dict[str, Any], str, str]] = {
+    "what was found": (
+        {},
+        "Vehicles in a.mp4 | 52 frames | 320 × 240 pixels | 2 vehicles | 1 truck | crf: 25 | Paths",
+        "clips/ | Flows | Findings",
+    ),
+    "the video of the run": (
+        {}, "maximum at once | a.mp4, with the vehicles drawn.", "No video to show",
+    ),
+    "the source as its video": (
+        {"player": SOURCE}, "b.mp4, the source; this run did not write a video", "drawn.",
+    ),
+    "no video": ({"player": None}, "No video to show", "../a.mp4 | clips/"),
+    "no vehicles": (
+        {"records": (), "thumbnails": {}, "poster": None, "still": None},
+        "No vehicle was shown. | 0 vehicles", "1 truck",
+    ),
+    "gaps of the video": ({"spans": [(0, 1), (2, 2)]}, "No frames from 0:01 to 0:02", ""),
+    "counts by interval": (
+        {"survey": survey(BY_NAME), "settings": EVERY_SECOND},
+        f"At lines and zones | north: in: 3 | {NASTY}: in: 1", "",
+    ),
+    "no counts by interval without one": ({"survey": survey(BY_NAME)}, "", "At lines and zones"),
+    "vehicles by interval and class, if they drove": (
+        {"records": [BUS, STOOD[1]], "settings": EVERY_SECOND}, "First seen | bus: 1", "truck: 1",
+    ),
+    "a row for each direction with its classes": (
+        {"survey": survey(BY_CLASS)},
+        "direction all vehicles car truck vehicle heavy, % north in 2 1 1 0 50 north out 1 0 0 1 0",
+        "",
+    ),
+    "a row for each flow": (
+        {"survey": survey(FLOWS)}, "from to all vehicles north south 1 north (none) 1", "",
+    ),
+    "speeds": ({"survey": survey(SPEEDS)}, "north in 2 38 39", ""),
+    "doubts with their times": ({"findings": (DARK,)}, "Findings | it <was> dark", ""),
+    "no paths of a moving camera": ({"findings": (MOVES,)}, "Findings", "Paths"),
+    "vehicles that stood apart": (
+        {"records": [replace(TWO[0], motion="drove"), STOOD[1]]}, "1 vehicle | 1 standing", "",
+    ),
+    "no card for vehicles of unknown class": (
+        {"records": [replace(TWO[0], class_name="vehicle"), TWO[1]]},
+        "2 vehicles 1 truck 1 maximum at once", "",
+    ),
+}  # fmt: skip
 
-    def test_it_says_what_was_found(self) -> None:
-        text = seen(page()).text
-        for words in ("Vehicles in a.mp4", "52 frames", "320 × 240 pixels", "2vehicles", "1truck",
-                      "maximum at once", "crf: 25"):  # fmt: skip
-            assert words in text
 
-    def test_the_folders_of_the_clip_are_nobodys_business(self) -> None:
-        assert "clips/" not in page(player=None).html()
+@pytest.mark.parametrize("what", SHOWN)
+def test_the_page_shows(what: str) -> None:
+    changes, there, absent = SHOWN[what]
+    made = seen(replace(page(), **changes))
+    text = "".join(made.text.split())
+    for words in filter(None, there.split(" | ")):
+        assert "".join(words.split()) in text, words
+    for words in filter(None, absent.split(" | ")):
+        assert "".join(words.split()) not in text, words
+    assert len(made.all("video")) == (changes.get("player", VIDEO) is not None)
 
-    def test_the_player_shows_a_picture_until_it_plays(self) -> None:
-        (video,) = seen(page()).all("video")
-        assert (video["poster"] or "").startswith("data:image/jpeg;base64,")
 
-    @pytest.mark.parametrize(
-        ("player", "words"),
-        [
-            (VIDEO, "a.mp4, with the vehicles drawn."),
-            (
-                Player("b.mp4", "../b.mp4", is_drawn=False, start=0.0),
-                "b.mp4, the source; this run did not write a video",
-            ),
-            (None, "No video to show"),
-        ],
-    )
-    def test_it_says_which_video_it_shows(self, player: Player | None, words: str) -> None:
+def test_it_loads_nothing_but_the_video_and_its_own_data() -> None:
+    for player, expected in ((VIDEO, {"../a.mp4"}), (None, set[str]())):
         made = seen(page(player=player))
-        assert words in made.text
-        assert len(made.all("video")) == (player is not None)
-        if player is None:
-            assert all(address.startswith("data:") for address in made.addresses())
+        own = [a.partition("#")[0] for a in made.addresses() if not a.startswith("data:")]
+        assert set(own) == expected
+    (video,) = seen(page()).all("video")
+    assert (video["poster"] or "").startswith("data:image/jpeg;base64,"), "until it plays"
 
-    def test_counts_are_shown_by_interval_where_there_are_any(self) -> None:
-        counts = counted(*(("north", "in", at) for at in (1, 2, 3)), (NASTY, "in", 1))
-        made = seen(replace(page(), survey=survey(counts), settings=EVERY_SECOND))
-        assert "At lines and zones" in made.text
-        assert "north: in: 3" in made.text
-        assert f"{NASTY}: in: 1" in made.text
-        assert "At lines and zones" not in seen(replace(page(), survey=survey(counts))).text
 
-    def test_intervals_begin_at_round_times_of_the_clock_as_in_tables(self) -> None:
-        counts = counted(*(("north", "in", at) for at in (60, 360, 840)))
-        begin = datetime.fromisoformat("2026-05-01 07:10+02:00")
-        clock = Clock(begin, "as given", begin.tzinfo)
-        quarters = Settings(traffic=TrafficSettings(interval="15min"))
-        made = seen(replace(page(end=900), survey=survey(counts), settings=quarters, clock=clock))
-        tips = re.findall(r"07:..: . north: in", made.text)
-        assert tips == ["07:00: 1 north: in", "07:15: 2 north: in"]
-        rows = replace(counts, spans=((0, 899.96),), clock=clock).table(900)
-        assert [(f"{row.start:%H:%M}", row.count) for row in rows] == [("07:00", 1), ("07:15", 2)]
+def test_a_flow_has_an_arrow() -> None:
+    images = seen(replace(page(), survey=survey(FLOWS))).all("img")
+    assert any("an arrow for each flow" in (item["alt"] or "") for item in images)
 
-    def test_vehicles_are_counted_by_interval_and_class_if_they_drove(self) -> None:
-        stood = replace(TWO[1], motion="standing")
-        made = seen(
-            replace(
-                page(), records=[replace(TWO[0], class_name="bus"), stood], settings=EVERY_SECOND
-            )
-        )
-        assert "First seen" in made.text
-        assert "bus: 1" in made.text
-        assert "truck: 1" not in made.text
 
-    def test_lines_have_a_row_for_each_direction_with_its_classes(self) -> None:
-        counts = counted(("north", "in", 1), ("north", "in", 2), ("north", "out", 3))
-        car, truck, other = counts.events
-        events = replace(car, class_name="car"), replace(truck, class_name="truck"), other
-        made = seen(replace(page(), survey=survey(replace(counts, events=events))))
-        words = (
-            "line or zone direction all vehicles car truck vehicle heavy, %"
-            " north in 2 1 1 0 50 north out 1 0 0 1 0"
-        )
-        assert re.search(words.replace(" ", r"\s*"), made.text)
+def test_intervals_begin_at_round_times_of_the_clock_as_in_tables() -> None:
+    counts = counted(*(("north", "in", at) for at in (60, 360, 840)))
+    begin = datetime.fromisoformat("2026-05-01 07:10+02:00")
+    clock = Clock(begin, "as given", begin.tzinfo)
+    quarters = Settings(traffic=TrafficSettings(interval="15min"))
+    made = seen(replace(page(end=900), survey=survey(counts), settings=quarters, clock=clock))
+    tips = re.findall(r"07:..: . north: in", made.text)
+    assert tips == ["07:00: 1 north: in", "07:15: 2 north: in"]
+    rows = replace(counts, spans=((0, 899.96),), clock=clock).table(900)
+    assert [(f"{row.start:%H:%M}", row.count) for row in rows] == [("07:00", 1), ("07:15", 2)]
 
-    def test_flows_have_a_row_and_an_arrow_each(self) -> None:
-        counts = counted(("north", "in", 1, 1), ("south", "out", 2, 1), ("north", "in", 1, 2))
-        made = seen(replace(page(), survey=survey(counts)))
-        assert re.search(
-            r"from\s*to\s*all vehicles\s*north\s*south\s*1\s*north\s*\(none\)\s*1", made.text
-        )
-        assert any("an arrow for each flow" in (item["alt"] or "") for item in made.all("img"))
-        assert "Flows" not in seen(page()).text
 
-    def test_speeds_are_shown_where_they_are_known(self) -> None:
-        counts = counted(("north", "in", 1, 1, 36.0), ("north", "in", 2, 2, 40.0))
-        made = seen(replace(page(), survey=survey(counts)))
-        assert re.search(r"north\s*in\s*2\s*38\s*39", made.text)
+def test_a_vehicle_that_was_lost_has_a_gap_in_its_bar() -> None:
+    states = ("detected", "detected", "predicted", "predicted", "interpolated", "detected")
+    frames = [frame(n, track(1, BOX, state=state)) for n, state in enumerate(states)]
+    made = seen(replace(page(end=0.2), records=records(*frames)))
+    spans = [(item["x"], item["width"]) for item in made.all("svg", **{"class": "span"})]
+    assert spans == [("0.0%", "20.0%"), ("80.0%", "20.0%")]
 
-    def test_a_vehicle_that_was_lost_has_a_gap_in_its_bar(self) -> None:
-        states = ("detected", "detected", "predicted", "predicted", "interpolated", "detected")
-        frames = [frame(n, track(1, BOX, state=state)) for n, state in enumerate(states)]
-        made = seen(replace(page(end=0.2), records=records(*frames)))
-        spans = [(item["x"], item["width"]) for item in made.all("svg", **{"class": "span"})]
-        assert spans == [("0.0%", "20.0%"), ("80.0%", "20.0%")]
 
-    def test_gaps_of_the_video_are_named(self) -> None:
-        assert "No frames from 0:01 to 0:02" in seen(replace(page(), spans=[(0, 1), (2, 2)])).text
+def test_every_name_is_escaped() -> None:
+    bus = replace(track(1, Box.sized(5, 5, 30, 30)), class_name=NASTY)
+    made = replace(
+        page(source=Path("clips") / NASTY, player=player_of(NASTY)),
+        records=records(frame(0, bus), frame(1, bus)),
+        settings=Settings(survey=SurveySettings(site=NASTY)),
+        thumbnails={1: jpeg_uri(STILL)},
+    )
+    plain, nasty = seen(page()), seen(made)
+    assert {tag for tag, _ in nasty.seen} == {tag for tag, _ in plain.seen}
+    assert not any("onerror" in attributes for _, attributes in nasty.seen)
+    assert nasty.all("img", src="x") == []
+    assert nasty.text.count(NASTY) >= 6
+    (video,) = nasty.all("video")
+    assert unquote(video["src"] or "") == f"../{NASTY}"
+    assert re.fullmatch(r"[\w./%~-]+", video["src"] or ""), "nothing in it has a meaning"
 
-    def test_a_video_without_vehicles_has_a_page_too(self) -> None:
-        empty = replace(page(), records=(), thumbnails={}, poster=None, still=None)
-        made = seen(empty)
-        assert "No vehicle was shown." in made.text
-        assert "0vehicles" in made.text
 
-    def test_every_name_is_escaped(self) -> None:
-        bus = replace(track(1, Box.sized(5, 5, 30, 30)), class_name=NASTY)
-        made = replace(
-            page(source=Path("clips") / NASTY, player=player_of(NASTY)),
-            records=records(frame(0, bus), frame(1, bus)),
-            settings=Settings(survey=SurveySettings(site=NASTY)),
-            thumbnails={1: jpeg_uri(STILL)},
-        )
-        plain, nasty = seen(page()), seen(made)
-        assert {tag for tag, _ in nasty.seen} == {tag for tag, _ in plain.seen}
-        assert not any("onerror" in attributes for _, attributes in nasty.seen)
-        assert nasty.all("img", src="x") == []
-        assert nasty.text.count(NASTY) >= 6
-        (video,) = nasty.all("video")
-        assert unquote(video["src"] or "") == f"../{NASTY}"
-        assert re.fullmatch(r"[\w./%~-]+", video["src"] or ""), "nothing in it has a meaning"
-
-    @pytest.mark.parametrize("name", ["a\x1b[31m\n\u202egpj.mp4", "clip\udcff.mp4"])
-    def test_a_name_that_is_no_plain_text_can_be_shown_and_reached(self, name: str) -> None:
-        made = page(source=Path(name), player=player_of(name))
-        html = made.html()
-        assert not {"\x1b", "\u202e", "\udcff"} & set(html)
-        html.encode("utf-8")
+@pytest.mark.parametrize("name", ["a\x1b[31m\n\u202egpj.mp4", "clip\udcff.mp4"])
+def test_a_name_that_is_no_plain_text_can_be_shown_and_reached(name: str) -> None:
+    made = page(source=Path(name), player=player_of(name))
+    html = made.html()
+    assert not {"\x1b", "\u202e", "\udcff"} & set(html)
+    html.encode("utf-8")
 
 
 def test_the_summary_has_the_counts_and_a_row_for_each_vehicle() -> None:
@@ -234,34 +229,6 @@ def test_the_summary_has_the_counts_and_a_row_for_each_vehicle() -> None:
             "certainty": "unsure",
         },
     ]  # fmt: skip
-
-
-class TestFindings:
-    FINDING = Finding("dark", "it <was> dark", ((0.5, 1.5),), "warning", 0.3)
-
-    def test_what_makes_it_doubtful_is_listed_with_its_times(self) -> None:
-        made = seen(replace(page(), findings=(self.FINDING,)))
-        assert "it <was> dark" in made.text
-        assert "Findings" in made.text
-        assert "Findings" not in seen(page()).text
-
-    def test_a_moving_camera_has_no_paths(self) -> None:
-        moves = replace(self.FINDING, code="camera-moves")
-        assert ["Paths" in seen(replace(page(), findings=f)).text for f in ((), (moves,))] == [
-            True,
-            False,
-        ]
-
-    def test_vehicles_of_unknown_class_have_no_card_of_their_own(self) -> None:
-        unknown = replace(page(), records=[replace(TWO[0], class_name="vehicle"), TWO[1]])
-        assert [n for n, _ in unknown._figures()][:3] == ["vehicles", "truck", "maximum at once"]
-
-    def test_vehicles_that_stood_are_counted_apart(self) -> None:
-        stood = [replace(record, motion="standing") for record in TWO]
-        made = replace(page(), records=[replace(TWO[0], motion="drove"), *stood[1:]])
-        assert "1vehicle" in seen(made).text
-        assert "1standing" in seen(made).text
-        assert made.summary["vehicles"] == 1
 
 
 @pytest.mark.parametrize(
