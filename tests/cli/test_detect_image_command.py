@@ -44,21 +44,6 @@ def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Sc
     )
 
 
-def test_a_picture_of_every_stage(run: Run, picture: Path, model_path: Path) -> None:
-    stages = picture.parent.parent / "stages"
-    result = run("detect-image", picture, "--stages", stages, "--model", model_path, code=0)
-    assert result.err.endswith(f"{stages}: written\n")
-    names = [
-        *("1-windows.png", "2-features.png", "3-hits.png", "4-heat.png", "5-threshold.png"),
-        "6-boxes.png",
-    ]
-    assert sorted(p.name for p in stages.iterdir()) == names
-    for name in names:
-        assert read_image(stages / name).shape == (
-            (384, 1152, 3) if "feat" in name else (180, 320, 3)
-        )
-
-
 def test_without_an_output_the_vehicles_are_printed(
     run: Run, picture: Path, model_path: Path
 ) -> None:

@@ -33,17 +33,6 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize(("names", "option", "text"), OPTIONS)
-def test_the_help_of_every_option_is_of_whole_sentences(
-    names: tuple[str, ...], option: str, text: str
-) -> None:
-    assert text, f"vdet {' '.join(names)} {option} has no help"
-    assert text[0].isupper()
-    assert text.endswith(".")
-    assert "…" not in text
-    assert ";" not in text, "two sentences in one"
-
-
 @pytest.mark.parametrize("names", COMMANDS, ids=" ".join)
 def test_the_help_shows_every_option_and_examples_that_can_be_run(
     run: Run, names: tuple[str, ...]
@@ -51,6 +40,7 @@ def test_the_help_shows_every_option_and_examples_that_can_be_run(
     command = COMMANDS[names]
     shown = run(*names, "--help", code=0).out
     assert command.help
+    assert all(option.help for option in command.params if isinstance(option, click.Option))
     assert "..." not in re.sub(r"[A-Z]\]?\.\.\.", "", shown), "a line is cut"
     for parameter in command.params:
         is_flag = isinstance(parameter, click.Option) and parameter.is_flag

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vdet.lanes.road import Lane, draw_lane, lane_text
+from vdet.lanes.road import Lane, draw_lane
 
 LANE = Lane(
     curvature=-1 / 812.34567,
@@ -39,9 +39,3 @@ def test_area_and_lines_are_drawn_and_nothing_beside_them() -> None:
     assert (frame[460:, 1020:] == 100).all()
     assert (frame[:120, :700] != 100).any(), "the text"
     assert (frame[130:440] == 100).all()
-
-
-def test_the_text_describes_the_bend_and_the_place_of_the_camera() -> None:
-    bend = ("lane 3.7 m wide, bends left, radius 812 m", "0.25 m left of its middle")
-    assert lane_text(LANE) == bend
-    assert lane_text(STRAIGHT) == ("lane 3.7 m wide, straight", "0.10 m right of its middle")

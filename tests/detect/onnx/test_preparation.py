@@ -78,12 +78,3 @@ def test_only_the_letterbox_of_other_networks_is_grey_beyond_the_frame(
     is_frame = np.isin(np.arange(96), np.arange(top, top + height))
     assert values[:, ~is_frame] == pytest.approx(114)
     assert (values[:, is_frame].round() != 114).any(axis=(0, 2)).all()
-
-
-def test_planes_are_not_changed() -> None:
-    picture = road(Coding())
-    assert picture.planes is not None
-    before = [layer.copy() for layer in picture.planes.layers]
-    InputForm(1280, 720).prepare(picture)[:] = 0
-    for layer, expected in zip(picture.planes.layers, before, strict=True):
-        np.testing.assert_array_equal(layer, expected)

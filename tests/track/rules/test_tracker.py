@@ -7,7 +7,7 @@ from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
 from track.rules.scenes import detections
-from vdet.boxes import NO_BOXES, Box, Boxes, Image
+from vdet.boxes import Box, Boxes, Image
 from vdet.media import Picture
 from vdet.track.rules import Region, RulesTracker, large_enough
 from vdet.track.track import Track
@@ -169,8 +169,3 @@ def test_the_score_of_a_track_is_the_average_of_its_last_ten_detections() -> Non
         cars.update(detections([SEDAN], score=0.05 * n), 0.0, Picture(GREY)) for n in range(12)
     ]
     assert [track.score for track in shown[-1]] == pytest.approx([0.05 * 6.5])
-
-
-def test_without_the_frame_it_says_that_it_needs_it() -> None:
-    with pytest.raises(ValueError, match="needs the frame"):
-        RulesTracker(SEED_TRACKER).update(NO_BOXES, 0.0)
