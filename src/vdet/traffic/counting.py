@@ -249,9 +249,9 @@ def count_frames(
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`."""
     frame_size = _frame_size(settings, size)
-    group = _Group(settings, frame_size, with_all_classes=with_all_classes)
-    group.add(_CountedVideo("", frame_size), frames)
-    return group.counts()[""]
+    recording = _Recording(settings, with_all_classes=with_all_classes)
+    recording.count(_CountedVideo("", frame_size), frames)
+    return recording.counts()[""]
 
 
 def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
@@ -327,15 +327,15 @@ class _CountedVideo:
 
 
 class _Recording:
-    """The videos of one camera."""
+    """The videos of one camera; those that follow one another, of one size, share a counter."""
 
     def __init__(self, settings: Settings, *, with_all_classes: bool) -> None:
         self._settings, self._with_all_classes = settings, with_all_classes
         self._counts: dict[str, Counts] = {}
-        self._group: _Group | None = None
-        self._latest: tuple[_CountedVideo, SavedTracks] | None = (
-            None  # what ends last, with a clock
-        )
+        self._counter: VehicleCounter | None = None
+        self._group: list[_CountedVideo] = []  # the videos of this counter
+        # What ends last, with a clock.
+        self._latest: tuple[_CountedVideo, SavedTracks] | None = None
         self._is_chain = False  # whether each video begins at the end of the one before
 
     def in_order(self, paths: Sequence[Path]) -> list[tuple[Path, Clock | None]]:
@@ -383,63 +383,33 @@ class _Recording:
             video.shift = before[0].shift + before[0].end + gap - video.first
             if gap < 0:
                 video.start = video.first - gap
-        group = self._group
-        if not (group and before and video.clock and group.size == size):
-            self._end_group()
-            started = group.counter.linker.started if group else 0
-            self._group = group = _Group(
-                self._settings, size, started, with_all_classes=self._with_all_classes
-            )
-        group.add(video, saved)
+        follows = before and video.clock and self._group[-1].size == size
+        self.count(video, saved, follows=bool(follows))
         if video.clock and (video.spans or not before):
             self._latest = video, saved
 
-    def _end_group(self) -> None:
-        self._counts |= self._group.counts() if self._group else {}
-
-    def counts(self) -> dict[str, Counts]:
-        """Return the counts of each video, in order."""
-        self._end_group()
-        return self._counts
-
-
-def _clock_after(before: _CountedVideo, video: _CountedVideo) -> Clock:
-    """Return the clock of a video that begins where the one before ends."""
-    if not before.is_complete:
-        fault = "the file before does not say how long its video is; use .jsonl tracks"
-        raise TruthError(f"{video.name}: has no clock, and {fault}")
-    assert before.clock
-    zero = before.clock.at(before.end) - timedelta(seconds=video.first)
-    return replace(before.clock, zero=zero.astimezone(UTC))
-
-
-class _Group:
-    """Videos that follow one another, with frames of one size and one counter."""
-
-    def __init__(
-        self,
-        settings: Settings,
-        size: tuple[int, int],
-        started: int = 0,
-        *,
-        with_all_classes: bool,
+    def count(
+        self, video: _CountedVideo, frames: Iterable[FrameTracks], *, follows: bool = False
     ) -> None:
-        self.size, self._ignored = size, settings.conditions.ignore
-        self._ground = ground_of(settings.camera, *size)
-        self._regions = Regions(settings.regions, *size) if settings.regions else None
-        self.counter = VehicleCounter(settings, *size, started, with_all_classes=with_all_classes)
-        self._videos: list[_CountedVideo] = []
-
-    def add(self, video: _CountedVideo, frames: Iterable[FrameTracks]) -> None:
-        """Count in the next video."""
-        if self._ground:
-            video.meter = SpeedMeter(self._ground, *self.size)
-        if self._videos:
-            video.frame_shift = self._videos[-1].next_shift
-            video.id_shift = self.counter.start_video()
-        self._videos.append(video)
+        """Count in a video, with the counter of the one before if it follows that."""
+        settings, size = self._settings, video.size
+        if ground := ground_of(settings.camera, *size):
+            video.meter = SpeedMeter(ground, *size)
+        regions = Regions(settings.regions, *size) if settings.regions else None
+        if self._counter and follows:
+            video.frame_shift = self._group[-1].next_shift
+            video.id_shift = self._counter.start_video()
+        else:
+            started = 0
+            if self._counter:
+                started = self._counter.linker.started
+                self.counts()
+            all_classes = self._with_all_classes
+            self._counter = VehicleCounter(settings, *size, started, with_all_classes=all_classes)
+            self._group = []
+        self._group.append(video)
         latest: FrameTracks | None = None
-        first_span, step = len(self.counter.spans), _STEP
+        first_span, step = len(self._counter.spans), _STEP
         for frame in frames:
             before = latest or frame
             if not before.time <= frame.time < math.inf:
@@ -451,9 +421,9 @@ class _Group:
                 step = (frame.time - latest.time) / max(1, frame.index - latest.index)
             latest = frame
             if frame.time >= video.start:
-                seen = frame.inside(self._regions) if self._regions else frame
+                seen = frame.inside(regions) if regions else frame
                 index, time = frame.index + video.frame_shift, frame.time + video.shift
-                self.counter.update(replace(seen, index=index, time=time))
+                self._counter.update(replace(seen, index=index, time=time))
                 if video.meter:
                     video.meter.add(seen)
         video.last = round(latest.time, 6) if latest else video.first
@@ -461,18 +431,29 @@ class _Group:
         video.next_shift = video.frame_shift + (latest.index + 1 if latest else 0)
         video.spans = tuple(
             (round(first - video.shift, 6), round(last - video.shift, 6))
-            for first, last in self.counter.spans[first_span:]
+            for first, last in self._counter.spans[first_span:]
         )
 
     def counts(self) -> dict[str, Counts]:
-        """Return the counts of each video, with times in that video."""
-        group = self.counter.counts()
-        counts = {}
-        for video in self._videos:
+        """Return the counts of each video so far, in order, with times in that video."""
+        assert self._counter
+        group = self._counter.counts()
+        for video in self._group:
             own = video.counts(group)
-            counts[video.name] = replace(own, findings=without(own.findings, self._ignored))
+            kept = without(own.findings, self._settings.conditions.ignore)
+            self._counts[video.name] = replace(own, findings=kept)
             group = replace(group, findings=())  # the first video has those of the group
-        return counts
+        return self._counts
+
+
+def _clock_after(before: _CountedVideo, video: _CountedVideo) -> Clock:
+    """Return the clock of a video that begins where the one before ends."""
+    if not before.is_complete:
+        fault = "the file before does not say how long its video is; use .jsonl tracks"
+        raise TruthError(f"{video.name}: has no clock, and {fault}")
+    assert before.clock
+    zero = before.clock.at(before.end) - timedelta(seconds=video.first)
+    return replace(before.clock, zero=zero.astimezone(UTC))
 
 
 def _gap(

@@ -50,8 +50,8 @@ _FREE = -1
 # roads with 38 vehicles: the fraction of the rows of tracks that changes.
 
 FIRST_STEP = 0.04
-"""Seconds that the first frame counts for: one of 25 frames a second. Half: 30 % of one road, whose
-ids begin in another order. Twice: nothing.
+"""Seconds that the first frame counts for: as at 25 frames a second. Half: 30 % of one road. Twice:
+nothing.
 """
 
 _STAYS = 0.75
