@@ -51,12 +51,13 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
                 "speed": round(float(90 * rng.random()), 1),
                 "lines": ("", "north → south", "south → north")[rng.integers(3)],
                 **dict.fromkeys(("distance", "lane")),
-                **dict.fromkeys(("motion", "side", "size", "picture", "clip"), ""),
+                **dict.fromkeys(("motion", "side", "size", "certainty", "picture", "clip"), ""),
             }
             for n in range(each)
         ]
         written[f"day{number // 100}/clip{number:05}"] = {
             "page": f"clip{number:05}.page/page.html",
+            "plays": True,
             "start": 0.0,
             "seconds": 600,
             "frames": 15000,
