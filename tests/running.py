@@ -7,16 +7,18 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from red_cars import HEIGHT, WIDTH, car_at, road
+from red_cars import car_at, road
+from vdet.boxes import Image
 from vdet.config.schema import OutputSettings
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.frame import Tags
@@ -55,20 +57,34 @@ VideoReader.__iter__ = held
 """
 
 
+def write_images(
+    path: Path,
+    images: Sequence[Image],
+    *,
+    rate: int = 25,
+    created: str | None = None,
+    **output: Any,
+) -> Path:
+    """Write images as a video; `output` are settings of it."""
+    height, width = images[0].shape[:2]
+    info = VideoInfo(path, width, height, Fraction(rate), Fraction(1, rate), frames=len(images))
+    info = replace(info, tags=Tags(creation_time=created))
+    with VideoWriter(path, info, OutputSettings.model_validate(output)) as writer:
+        for index, image in enumerate(images):
+            picture = Picture(np.ascontiguousarray(image))
+            writer.write(Frame(index, Fraction(index, rate), picture))
+    return path
+
+
 def write_drive(
     path: Path, frames: int, *, noise: bool = False, created: str | None = None
 ) -> Path:
     """Write a video of the red car that drives along; with `noise` a frame has some 30 kB."""
     random = np.random.default_rng(1)
-    info = VideoInfo(path, WIDTH, HEIGHT, Fraction(25), Fraction(1, 25), frames=frames)
-    info = replace(info, tags=Tags(creation_time=created))
-    with VideoWriter(path, info, OutputSettings(preset="ultrafast")) as writer:
-        for index in range(frames):
-            image = road(car_at(index % 200))
-            if noise:
-                image += random.integers(0, 100, image.shape, np.uint8)
-            writer.write(Frame(index, Fraction(index, 25), Picture(image)))
-    return path
+    images = [road(car_at(index % 200)) for index in range(frames)]
+    if noise:
+        images = [image + random.integers(0, 100, image.shape, np.uint8) for image in images]
+    return write_images(path, images, created=created, preset="ultrafast")
 
 
 def frames_of(path: Path | None) -> int:

@@ -1,7 +1,6 @@
 """Every doubt about a video is said at every step: 35 cells of a table."""
 
-from collections.abc import Callable, Sequence
-from fractions import Fraction
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -14,12 +13,10 @@ from benchmarks.zero import RATE, SIZE, road, traffic
 from conftest import Run as Program
 from red_cars import NullDetector
 from run.red_runs import outputs
+from running import write_images
 from vdet import load_settings
 from vdet.boxes import Image
 from vdet.config.loading import render_settings
-from vdet.config.schema import OutputSettings
-from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.writer import VideoWriter
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
@@ -71,19 +68,11 @@ def clean() -> list[Image]:
     return [renderer.image(index) for index in range(FRAMES)]
 
 
-def write_frames(path: Path, images: Sequence[Image]) -> None:
-    info = VideoInfo(path, *SIZE, Fraction(RATE), Fraction(1, RATE), frames=len(images))
-    with VideoWriter(path, info, OutputSettings()) as writer:
-        for index, image in enumerate(images):
-            picture = Picture(np.ascontiguousarray(image))
-            writer.write(Frame(index, Fraction(index, RATE), picture))
-
-
 def test_a_still_scene_is_said_where_its_count_of_0_is(
     tmp_path: Path, run: Program, clean: list[Image], caplog: pytest.LogCaptureFixture
 ) -> None:
     clip, tracks, gate = (tmp_path / name for name in ("in.mp4", "tracks.jsonl", "gate.yaml"))
-    write_frames(clip, [clean[0]] * FRAMES)
+    write_images(clip, [clean[0]] * FRAMES, rate=RATE)
     gate.write_text(render_settings(SETTINGS))
     names = "c.xlsx", "page"
     written = (
@@ -105,7 +94,8 @@ def test_a_doubt_is_said_at_every_step(
 ) -> None:
     change, words = WAYS[way]
     clip, tracks, gate = (tmp_path / name for name in ("in.mp4", "tracks.jsonl", "gate.yaml"))
-    write_frames(clip, [change(image, index) for index, image in enumerate(clean)])
+    images = [change(image, index) for index, image in enumerate(clean)]
+    write_images(clip, images, rate=RATE)
     gate.write_text(render_settings(SETTINGS))
     files = {".json": "c.json", ".xlsx": "c.xlsx", "page": "page", "review": "review"}
     sinks = zip(("counts", "counts", "page", "review"), files.values(), strict=True)

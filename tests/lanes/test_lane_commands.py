@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import yaml
 from conftest import Run
 from lanes.roads import make_road, settings_for
 from red_cars import SETTINGS, red_finder
+from running import write_images
 from vdet.boxes import Box, Image
 from vdet.config.kinds import WindowSettings
 from vdet.config.scene import LensSettings
@@ -23,10 +23,8 @@ from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.model import save_model
 from vdet.draw import color_of
 from vdet.lanes.camera import Undistorter, save_camera
-from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
-from vdet.media.writer import VideoWriter
 from vdet.synthetic import PinholeCamera, Renderer, Scene
 from writing import write_image
 
@@ -83,7 +81,7 @@ def files(road: Scene, undistorter: Undistorter, tmp_path_factory: pytest.TempPa
     made = Files(*(folder / name for name in names))
     renderer = Renderer(road)
     seen = [with_car(distorted(renderer.image(i), undistorter)) for i in range(COUNT)]
-    write_video(made.clip, seen)
+    write_images(made.clip, seen, crf=10)
     write_image(made.picture, seen[0])
     save_camera(LENS, made.camera)
     settings = red_settings(settings_for(road.camera))
@@ -104,13 +102,6 @@ def distorted(image: Image, undistorter: Undistorter) -> Image:
 def with_car(image: Image) -> Image:
     CAR.cut(image)[:] = (0, 0, 255)
     return image
-
-
-def write_video(path: Path, images: list[Image]) -> None:
-    info = VideoInfo(path, WIDTH, HEIGHT, Fraction(25), Fraction(1, 25), frames=len(images))
-    with VideoWriter(path, info, OutputSettings(crf=10)) as writer:
-        for index, image in enumerate(images):
-            writer.write(Frame(index, Fraction(index, 25), Picture(image)))
 
 
 def red_settings(lanes: LaneSettings) -> Settings:
@@ -215,7 +206,7 @@ def test_without_a_camera_no_output_of_a_video_has_metres(
     run: Run, files: Files, tmp_path: Path, road: Scene
 ) -> None:
     renderer, clip, out = Renderer(road), tmp_path / "plain.mp4", tmp_path / "out.mp4"
-    write_video(clip, [with_car(renderer.image(i)) for i in range(COUNT)])
+    write_images(clip, [with_car(renderer.image(i)) for i in range(COUNT)], crf=10)
     tracks, vehicles, page = (tmp_path / name for name in ("t.jsonl", "v.json", "v.page"))
     outputs = "--tracks", tracks, "--sink", f"vehicles={vehicles}", "--page", page
     result = run("detect-video", clip, out, *outputs, *files.red, "--lanes")

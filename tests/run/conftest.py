@@ -6,10 +6,9 @@ from pathlib import Path
 import pytest
 
 from red_cars import drive
-from run.red_runs import COUNT, video_info
+from run.red_runs import COUNT
+from running import write_images
 from vdet import plugins
-from vdet.config.schema import OutputSettings
-from vdet.media.writer import VideoWriter
 from vdet.run.sinks.protocol import SinkKind
 
 Register = Callable[[str, SinkKind], None]
@@ -19,10 +18,7 @@ Register = Callable[[str, SinkKind], None]
 def red_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A video of the red car that drives from left to right."""
     path = tmp_path_factory.mktemp("red") / "red.mp4"
-    with VideoWriter(path, video_info(), OutputSettings(crf=10)) as writer:
-        for frame in drive(COUNT):
-            writer.write(frame)
-    return path
+    return write_images(path, [frame.image for frame in drive(COUNT)], crf=10)
 
 
 @pytest.fixture

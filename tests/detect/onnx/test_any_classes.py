@@ -1,6 +1,5 @@
 """Networks of any number of classes work in every output."""
 
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +7,11 @@ import pytest
 
 from conftest import Run
 from detect.onnx.graphs import RedBox, ultralytics, write_network
-from vdet.config.schema import NetworkSettings, OutputSettings
+from running import write_images
+from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import NetworkModel
 from vdet.labels.reading import read_tracks
-from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.writer import VideoWriter
+from vdet.media import Picture
 
 SIZE = 256, 128
 FORMATS = (".txt", ".csv", ".jsonl", ".coco.json")
@@ -24,12 +23,7 @@ def clip(tmp_path: Path) -> Path:
     """A second of a grey video with a red square in the middle."""
     image = np.full((SIZE[1], SIZE[0], 3), 60, np.uint8)
     image[48:80, 112:144] = 0, 0, 255
-    path, rate = tmp_path / "in.mp4", Fraction(12)
-    info = VideoInfo(path, *SIZE, rate, 1 / rate, frames=12)
-    with VideoWriter(path, info, OutputSettings(crf=1)) as writer:
-        for index in range(12):
-            writer.write(Frame(index, index / rate, Picture(image)))
-    return path
+    return write_images(tmp_path / "in.mp4", [image] * 12, rate=12, crf=1)
 
 
 @pytest.mark.parametrize("count", [2, 20])

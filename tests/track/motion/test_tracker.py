@@ -84,13 +84,6 @@ def test_through_missed_frames_a_vehicle_is_shown_where_its_motion_leads() -> No
         assert tracks[0].box.iou(place) > 0.9
 
 
-def test_after_that_it_is_not_shown_but_keeps_its_id() -> None:
-    gone = CARRIED + 5
-    shown = follow([*[[CAR]] * 20, *[[]] * gone, *[[CAR]] * 8])
-    assert [len(tracks) for tracks in shown[20 : 20 + gone]] == [1] * CARRIED + [0] * 5
-    assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5  # once it is sure again
-
-
 def test_a_vehicle_is_shown_without_detections_for_as_long_as_the_settings_say() -> None:
     shown = follow([*[[CAR]] * 20, *[[]] * 40], coast_seconds=0.9, confirm_seconds=0.3)
     assert sum(map(len, shown[20:])) == frames(0.9)
