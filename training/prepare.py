@@ -14,8 +14,7 @@ from benchmarks.unseen import deal
 
 from vdet.config.schema import Settings
 from vdet.labels.reading import Roles, read_labelled_images
-from vdet.synthetic.render import Renderer, true_boxes
-from vdet.synthetic.scene import demo_scene
+from vdet.synthetic import Renderer, demo_scene, true_boxes
 
 NEW = (
     *("bdd_empty_roads", "bdd_night", "bdd_rain", "bdd_trucks_day", "delhi_junctions"),
