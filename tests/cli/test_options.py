@@ -9,7 +9,7 @@ def test_changes_are_those_of_all_options_also_with_odd_names() -> None:
     @click.command()
     @model_option
     @classes_option
-    @settings_options(model="detector.model", classes="classes")
+    @settings_options
     def command(source: SettingsSource) -> SettingsSource:
         return source
 

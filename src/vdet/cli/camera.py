@@ -72,7 +72,7 @@ def calibrate(
 @options.start_option
 @options.end_option
 @options.model_option
-@options.settings_options(model="detector.model")
+@options.settings_options
 @options.overwrite_option
 def draw(
     clip: Path,

@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     show_default="from TRACKS",
     help="Frame rate of the video, for TRACKS without times.",
 )
-@options.classes_option
+@options.class_option()
 @options.strict_option
-@options.settings_options(interval="traffic.interval", begin="input.begin")
+@options.settings_options
 @options.overwrite_option
 def count(
     tracks: options.Paths,
@@ -198,7 +198,7 @@ def _matrix(videos: "Sequence[Counts]") -> list[str]:
 @options.corrections_option
 @options.start_option
 @options.end_option
-@options.settings_options()
+@options.settings_options
 @options.overwrite_option
 def review(
     source_path: Path,

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 @options.classes_option
 @options.lanes_option
 @options.model_option
-@options.settings_options(classes="classes", lanes="lanes.enabled", model="detector.model")
+@options.settings_options
 @options.overwrite_option
 def detect_image(
     images: options.Paths,
@@ -134,11 +134,18 @@ _ENDING = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
     help="Write a clip of each time span with vehicles into DIR. With lines or zones, only counted "
     "vehicles have clips.",
 )
-@click.option(
-    "--margin", type=float, metavar="SECONDS", help="Time added around each clip (`clips.margin`)."
+@options.setting_option(
+    "clips.margin",
+    "--margin",
+    type=float,
+    metavar="SECONDS",
+    help="Time added around each clip (`clips.margin`).",
 )
-@click.option(
-    "--exact", is_flag=True, help="Cut clips at exact frames, by encoding again (`clips.exact`)."
+@options.setting_option(
+    "clips.exact",
+    "--exact",
+    is_flag=True,
+    help="Cut clips at exact frames, by encoding again (`clips.exact`).",
 )
 @options.counts_option
 @options.flows_option
@@ -154,8 +161,12 @@ _ENDING = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
 @options.start_option
 @options.end_option
 @options.number_option("--frames", help="Process at most N frames.")
-@options.number_option(
-    "--stride", type=click.IntRange(1, 100), help="Search every N-th frame (`detector.stride`)."
+@options.setting_option(
+    "detector.stride",
+    "--stride",
+    type=click.IntRange(1, 100),
+    metavar="N",
+    help="Search every N-th frame (`detector.stride`).",
 )
 @options.begin_option
 @options.strict_option
@@ -179,16 +190,7 @@ _ENDING = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
 )
 @options.lanes_option
 @options.model_option
-@options.settings_options(
-    margin="clips.margin",
-    exact="clips.exact",
-    interval="traffic.interval",
-    classes="classes",
-    stride="detector.stride",
-    begin="input.begin",
-    lanes="lanes.enabled",
-    model="detector.model",
-)
+@options.settings_options
 def detect_video(
     videos: options.Paths,
     no_video: bool,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     help="Ignore vehicles narrower than this fraction of the image width, 0 to 1.",
 )
 @options.model_option
-@options.settings_options(model="detector.model")
+@options.settings_options
 @results_options
 def images(
     data: options.Paths, min_width: float, source: SettingsSource, results: ResultFiles
@@ -61,7 +61,7 @@ def images(
 @click.argument("prediction", type=options.PATH, metavar="PRED")
 @click.argument("truth", type=options.PATH, metavar="TRUTH")
 @options.until_option
-@options.settings_options()
+@options.settings_options
 @results_options
 def tracks(
     prediction: Path, truth: Path, until: int | None, source: SettingsSource, results: ResultFiles
@@ -91,7 +91,7 @@ def tracks(
 @options.truths_option
 @options.until_option
 @options.model_option
-@options.settings_options(model="detector.model")
+@options.settings_options
 @results_options
 def video(
     videos: options.Paths,

@@ -38,7 +38,7 @@ _ANY_SIZE = 1000, 1000
 @command()
 @click.argument("path", type=PATH, metavar="[FILE]", required=False)
 @facts_options
-@settings_options()
+@settings_options
 def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> None:
     """Describe a model or the settings of a camera, or check this machine.
 
@@ -55,7 +55,10 @@ def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> Non
     results.check(source.inputs(*([path] if path else ())))
     settings = source.load()
     if path:
-        facts = {"file": str(path), **_model(path)}
+        read = _MODELS.get(path.suffix.lower())
+        if not read:
+            raise ModelError(f"{path}: must be .npz or .onnx; ffprobe describes videos and images")
+        facts = {"file": str(path), **read(path)}
     elif source.configs:
         facts = {"file": " ".join(source.configs), **_camera(settings)}
     else:
@@ -66,15 +69,6 @@ def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> Non
         if name != "provenance"
     ]
     results.print(lines, facts)
-
-
-def _model(path: Path) -> Facts:
-    match path.suffix.lower():
-        case ".npz":
-            return _linear_model(path)
-        case ".onnx":
-            return _network(path)
-    raise ModelError(f"{path}: must be .npz or .onnx; ffprobe describes videos and images")
 
 
 def _machine() -> Facts:
@@ -151,8 +145,11 @@ def _network(path: Path) -> Facts:
     }
 
 
+_MODELS = {".npz": _linear_model, ".onnx": _network}
+
+
 @command()
-@settings_options()
+@settings_options
 def config(source: SettingsSource) -> None:
     """Print the effective settings as commented YAML.
 

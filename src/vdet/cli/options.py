@@ -32,6 +32,7 @@ PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
 
 _TIME = re.compile(r"([0-9]{1,4}:){0,2}[0-9]{1,8}(\.[0-9]{1,9})?", re.ASCII)
+_CHANGES = "vdet.changes"  # in the context of click: the settings that options change
 _PAIR = re.compile(r"([1-9][0-9]{0,4})[x×]([1-9][0-9]{0,4})", re.ASCII | re.IGNORECASE)
 
 
@@ -61,6 +62,25 @@ def _parse_sink(text: str) -> Output:
     return Output(name, Path(path))
 
 
+def _changing(key: str) -> dict[str, Any]:
+    """Return the attributes of an option that changes a setting: see `settings_options`."""
+
+    def keep(context: click.Context, option: click.Parameter, value: Any) -> None:
+        if value is not None and value is not False and value != ():
+            from vdet.config.loading import given
+
+            plain = str(value) if isinstance(value, Path) else value
+            changes = context.meta.setdefault(_CHANGES, [])
+            changes.append(given(tuple(key.split(".")), plain, option.opts[0]))
+
+    return {"expose_value": False, "callback": keep}
+
+
+def setting_option(key: str, *names: str, **attributes: Any) -> Callable[[Function], Function]:
+    """Return an option that changes the setting `key`, of commands with `settings_options`."""
+    return click.option(*names, **_changing(key), **attributes)
+
+
 input_file = partial(click.option, type=PATH, metavar="FILE")
 output_file = partial(click.option, type=PATH, metavar="FILE")
 output_folder = partial(click.option, type=PATH, metavar="DIR")
@@ -80,12 +100,14 @@ flows_option = output_files(
     help="Write flows from one line or zone to another: .csv, .wide.csv (a row for each interval), "
     ".json (with the matrix), or the workbook (.xlsx). Can be repeated.",
 )
-interval_option = click.option(
+interval_option = setting_option(
+    "traffic.interval",
     "--interval",
     metavar="TIME",
     help="Interval of tables and charts, such as 5min, 15min or 1h (`traffic.interval`).",
 )
-begin_option = click.option(
+begin_option = setting_option(
+    "input.begin",
     "--begin",
     metavar="TIME",
     help="Start time of the video, such as '2026-05-01 07:00+02:00' (`input.begin`).",
@@ -109,13 +131,15 @@ tracks_from_option = partial(
     "tracks",
     help="Read the tracks from FILE instead of detecting vehicles.",
 )
-classes_option = click.option(
+class_option = partial(
+    click.option,
     "--class",
     "classes",
     metavar="NAME",
     multiple=True,
     help="Keep only vehicles of this class, such as truck. Can be repeated (`classes`).",
 )
+classes_option = class_option(**_changing("classes"))
 strict_option = click.option(
     "--strict", is_flag=True, help="Exit with code 4 if a result is doubtful."
 )
@@ -134,11 +158,14 @@ until_option = number_option(
     show_default="last frame of the ground truth",
     help="Stop after this frame, counted from 1.",
 )
-lanes_option = click.option(
-    "--lanes", is_flag=True, help="Find and draw the lane (`lanes.enabled`)."
+lanes_option = setting_option(
+    "lanes.enabled", "--lanes", is_flag=True, help="Find and draw the lane (`lanes.enabled`)."
 )
-model_option = input_file(
+model_option = setting_option(
+    "detector.model",
     "--model",
+    type=PATH,
+    metavar="FILE",
     help="Detector model: .npz or .onnx. It determines the detector (`detector.model`).",
 )
 _configs_option = click.option(
@@ -219,34 +246,17 @@ class SettingsSource:
         return load_settings(self.files, options=[*changes, *self.options], detector=detector)
 
 
-def settings_options(**keys: str) -> Callable[[Function], Function]:
-    """Add `-c FILE` and `--set KEY=VALUE`; the command receives all settings as `source`.
+def settings_options(command: Function) -> Function:
+    """Add `-c FILE` and `--set KEY=VALUE`; the command receives all settings as `source`."""
 
-    `keys` has the setting that each other option changes, by the name of its argument.
-    """
+    @_configs_option
+    @_assignments_option
+    @wraps(command)
+    def with_source(configs: tuple[str, ...], assignments: tuple[str, ...], **values: Any) -> Any:
+        changes = click.get_current_context().meta.get(_CHANGES, ())
+        return command(source=SettingsSource(configs, assignments, tuple(changes)), **values)
 
-    def decorate(command: Function) -> Function:
-        @_configs_option
-        @_assignments_option
-        @wraps(command)
-        def with_source(
-            configs: tuple[str, ...], assignments: tuple[str, ...], **values: Any
-        ) -> Any:
-            options = []
-            for name, key in keys.items():
-                value = values.pop(name)
-                if value is not None and value is not False and value != ():
-                    from vdet.config.loading import given
-
-                    option = "--class" if name == "classes" else f"--{name}"
-                    plain = str(value) if isinstance(value, Path) else value
-                    options.append(given(tuple(key.split(".")), plain, option))
-            source = SettingsSource(configs, assignments, tuple(options))
-            return command(source=source, **values)
-
-        return with_source
-
-    return decorate
+    return with_source
 
 
 def reject_regions(settings: "Settings") -> None:

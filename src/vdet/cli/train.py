@@ -22,7 +22,7 @@ _FEW_STEPS = 500
 @command()
 @click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
 @options.output_file("-o", "--output", required=True, help="Model file to write, .npz.")
-@options.settings_options()
+@options.settings_options
 @options.jobs_option(help="Compute features in N threads.")
 @options.overwrite_option
 def train(
@@ -63,7 +63,7 @@ def train(
 )
 @options.until_option
 @options.model_option
-@options.settings_options(model="detector.model")
+@options.settings_options
 @options.overwrite_option
 def mine(
     videos: Paths,
@@ -130,7 +130,7 @@ def mine(
     show_default=True,
     help="Compute on auto (a GPU if torch finds one), cpu or cuda.",
 )
-@options.settings_options()
+@options.settings_options
 @options.overwrite_option
 def train_net(
     data: Paths,
