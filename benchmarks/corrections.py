@@ -22,8 +22,7 @@ import numpy as np
 from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
 from vdet.boxes import Box
 from vdet.config.schema import Settings
-from vdet.review.correcting import apply_corrections
-from vdet.review.corrections import Corrections, ReviewedEvent, paired
+from vdet.review.corrections import Corrections, ReviewedEvent, apply_corrections, paired
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import Counts, Event

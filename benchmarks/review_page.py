@@ -28,8 +28,7 @@ from vdet.files import OutputFiles
 from vdet.findings import Findings
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.pages.render import REVIEW_NAME
-from vdet.review.correcting import apply_corrections
-from vdet.review.corrections import Corrections
+from vdet.review.corrections import Corrections, apply_corrections
 from vdet.review.strips import BandPassage, Passages, bands_of
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks

@@ -18,8 +18,7 @@ import numpy as np
 from benchmarks.drawn_traffic import as_planes
 from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
 from vdet.boxes import Image
-from vdet.review.strips import Band, BandPassage, Passages, bands_of, sampling_of
-from vdet.review.traces import TraceSearch
+from vdet.review.strips import Band, BandPassage, Passages, TraceSearch, bands_of, sampling_of
 from vdet.synthetic import frames
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Trace

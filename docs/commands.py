@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.main import cli
+from vdet.cli.command import cli
 
 PAGE = Path(__file__).with_name("commands.md")
 

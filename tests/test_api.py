@@ -399,7 +399,7 @@ def test_follow_may_be_left_while_a_frame_is_read(
 
     monkeypatch.setattr(VideoReader, "__iter__", slow)
     monkeypatch.setattr(VideoReader, "__exit__", noted)
-    monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", 0.1)
+    monkeypatch.setattr("vdet.workers.JOIN_TIMEOUT", 0.1)
     at_once = vdet.load_settings(assignments=["detector.stride=1", "tracker.look_ahead=0"])
     results = vdet.follow(clip_path, settings=at_once)
     next(results)

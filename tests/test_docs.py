@@ -11,7 +11,7 @@ import click
 import pytest
 from docs.commands import PAGE
 
-from vdet.cli.main import cli
+from vdet.cli.command import cli
 from vdet.cli.options import SettingsSource
 
 ROOT = Path(__file__).parents[1]

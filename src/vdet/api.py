@@ -41,8 +41,7 @@ from vdet.labels.label import Format, SavedTracks, SourceVideo
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
-from vdet.review.correcting import apply_corrections
-from vdet.review.corrections import Corrections
+from vdet.review.corrections import Corrections, apply_corrections
 from vdet.run.images import ImageJob, ImageSearch, input_files, run_images
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output

@@ -8,7 +8,7 @@ import click
 import pytest
 
 from conftest import Run
-from vdet.cli.main import cli
+from vdet.cli.command import cli
 
 
 def commands(group: click.Group, *names: str) -> Iterator[tuple[tuple[str, ...], click.Command]]:

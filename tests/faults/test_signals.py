@@ -15,7 +15,7 @@ import sys, time
 class Slow:
     @staticmethod
     def find_spec(name, *_):
-        if name == "vdet.cli.main":
+        if name == "vdet.cli.command":
             print("loading", file=sys.stderr, flush=True)
             time.sleep(60)
 

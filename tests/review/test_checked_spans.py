@@ -20,7 +20,7 @@ from review.test_corrections import (
     ways,
 )
 from vdet.errors import ConfigError
-from vdet.review.correcting import apply_corrections
+from vdet.review.corrections import apply_corrections
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import ALL, Counts, Estimate, Event, VehicleGroup
 

@@ -24,8 +24,7 @@ from traffic.scenes import (
 )
 from vdet.errors import ConfigError
 from vdet.labels.label import SourceVideo
-from vdet.review.correcting import apply_corrections
-from vdet.review.corrections import Corrections, by_video
+from vdet.review.corrections import Corrections, apply_corrections, by_video
 from vdet.review.estimate import estimate
 from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import ALL, Counts, Event, VehicleGroup

@@ -18,8 +18,7 @@ from run.red_runs import outputs
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.loading import load_settings
 from vdet.media import Picture
-from vdet.review.strips import Band, Passages
-from vdet.review.traces import TraceSearch
+from vdet.review.strips import Band, Passages, TraceSearch
 from vdet.run.loop import Parts
 from vdet.run.steps import findings_in
 from vdet.run.video import Run, run_video

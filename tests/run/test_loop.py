@@ -30,8 +30,8 @@ from vdet.media.frame import Planes
 from vdet.run import video
 from vdet.run.loop import FIRST_FRAMES, Parts
 from vdet.run.steps import FrameResult
-from vdet.run.threads import SearchThreads
 from vdet.run.video import Run, run_video
+from vdet.workers import SearchThreads
 
 QUEUED = 24
 """Largest number of frames that a run may hold at a time."""

@@ -8,7 +8,7 @@ from itertools import islice
 import pytest
 
 from running import SOON
-from vdet.run.threads import SearchThreads, read_async, write_async
+from vdet.workers import SearchThreads, read_async, write_async
 
 PLACES = ("source", "function", "taker")
 Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
@@ -16,7 +16,7 @@ Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemE
 
 @pytest.fixture(autouse=True)
 def no_thread_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", SOON)
+    monkeypatch.setattr("vdet.workers.JOIN_TIMEOUT", SOON)
     yield
     assert threads_of_vdet() == []
 

@@ -1,5 +1,5 @@
 """The command line, one file for each command: it parses, calls the library and prints."""
 
-from vdet.cli.main import main
+from vdet.cli.command import main
 
 __all__ = ["main"]

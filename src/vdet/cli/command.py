@@ -1,12 +1,14 @@
-"""Commands with `-q` and `-v`, the program, and the lines that it prints.
+"""The program: its commands, what it prints, and where errors become messages and exit codes.
 
 Lines, log records and progress bars do not garble one another. Other packages extend the program.
 """
 
 import logging
+import os
 import sys
+import traceback
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -14,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.errors import escaped
+from vdet.errors import INTERRUPTED, ConfigError, VdetError, escaped, in_one_line
 from vdet.files import output_errors
 from vdet.plugins import COMMANDS, built_in_names, load_plugin, plugin_names
 from vdet.progress import Advance, Progress, no_progress
+from vdet.version import __version__
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -173,3 +176,55 @@ def verbosity_options() -> list[click.Parameter]:
 def _set_verbosity(_: click.Context, option: click.Parameter, is_set: bool) -> None:
     if is_set and not is_quiet():  # --quiet wins
         LOG.setLevel(logging.ERROR if option.name == "quiet" else logging.DEBUG)
+
+
+cli = Program(
+    "vdet",
+    help="Find and follow vehicles in road video on an ordinary CPU.",
+    params=verbosity_options(),
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+)
+click.version_option(__version__, prog_name="vdet")(cli)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program, and return its exit code.
+
+    The codes are in `vdet.errors`. An error is one line on standard error; with `VDET_DEBUG=1` in
+    the environment a traceback follows.
+    """
+    set_up_logs()
+    try:
+        code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
+    except click.ClickException as error:
+        if not isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):
+            error.message = escaped(error.message)  # type: ignore[misc]  # it may name a file
+        error.show()
+        return error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        return _print_error(["interrupted"], INTERRUPTED)
+    except BrokenPipeError:  # the reader of our output has ended
+        _drop_unwritten()
+        return 1
+    except Exception as error:
+        code = error.exit_code if isinstance(error, VdetError) else VdetError.exit_code
+        is_list = isinstance(error, ConfigError) and len(error.args) > 1
+        lines = error.args if is_list else [in_one_line(error)]
+        return _print_error(lines, code)
+    return code if isinstance(code, int) else 0
+
+
+def _print_error(lines: Iterable[str], code: int) -> int:
+    print_lines(*(f"vdet: {line}" for line in lines), err=True)
+    if os.environ.get("VDET_DEBUG") == "1":
+        traceback.print_exc()
+    _drop_unwritten()
+    return code
+
+
+def _drop_unwritten() -> None:
+    """Drop output that cannot be written, or Python would try again at exit."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -86,8 +86,7 @@ def count(
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
     from vdet.pages.traffic import survey_image
-    from vdet.review.correcting import apply_corrections
-    from vdet.review.corrections import Corrections
+    from vdet.review.corrections import Corrections, apply_corrections
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.counting import count_files
     from vdet.traffic.survey import Survey

@@ -10,8 +10,7 @@ from vdet.config.classes import UNKNOWN
 from vdet.config.loading import Document, validated
 from vdet.errors import TruthError
 from vdet.evaluate.results import figure, table
-from vdet.review.correcting import judge
-from vdet.review.corrections import Corrections, ReviewedEvent
+from vdet.review.corrections import Corrections, ReviewedEvent, judge
 from vdet.traffic.counts import Counts, Event, class_of
 from vdet.traffic.output import VIDEO, read_table
 

@@ -46,10 +46,10 @@ from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
 from vdet.run.images import ImageSearch
 from vdet.run.loop import Parts
-from vdet.run.threads import SearchThreads
 from vdet.run.video import Results, Run
 from vdet.track.track import Track
 from vdet.version import __version__
+from vdet.workers import SearchThreads
 
 _MAX_DETECTIONS = 1000  # in an image, those of the highest scores
 

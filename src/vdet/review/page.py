@@ -26,11 +26,18 @@ from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
 from vdet.pages.render import TEMPLATES, render, thumbnail
 from vdet.pages.traffic import scene_picture
-from vdet.review.correcting import correct, covers
-from vdet.review.corrections import MAX_BYTES, Corrections
+from vdet.review.corrections import MAX_BYTES, Corrections, correct, covers
 from vdet.review.estimate import draw_spans, equal_spans, span_length, strata_of
-from vdet.review.strips import Band, BandPassage, Passages, Sampling, bands_of, sampling_of
-from vdet.review.traces import DELAY, TraceSearch
+from vdet.review.strips import (
+    DELAY,
+    Band,
+    BandPassage,
+    Passages,
+    Sampling,
+    TraceSearch,
+    bands_of,
+    sampling_of,
+)
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span
 from vdet.traffic.counts import Corrected, Counts, Event, Trace, class_of

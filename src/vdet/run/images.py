@@ -25,8 +25,8 @@ from vdet.run.loop import named_errors
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
 from vdet.run.steps import FrameResult, ParallelStep, StepContext, make_steps
-from vdet.run.threads import SearchThreads
 from vdet.track.track import Track
+from vdet.workers import SearchThreads
 
 _DATA_SUFFIXES = IMAGE_SUFFIXES | {".csv", ".json", ".txt", ".yaml", ".yml"}
 

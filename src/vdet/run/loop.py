@@ -42,8 +42,8 @@ from vdet.run.steps import (
     StepContext,
     make_steps,
 )
-from vdet.run.threads import SearchThreads
 from vdet.track.track import ShotTracker, TimedTracker, VideoTracker, make_tracker, timed
+from vdet.workers import SearchThreads
 
 _INTERVALS = 25
 """Number of the latest frame intervals whose trimmed mean is the usual interval."""

@@ -31,13 +31,12 @@ from vdet.run.loop import Parts, build, named_errors, peek, with_later_classes
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import FINDINGS, Fact, Facts, FrameResult, findings_in
-from vdet.run.threads import read_async
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, check_intervals, find_clock
 from vdet.traffic.counter import LiveTraffic, source_video
 from vdet.traffic.counts import Corrected, Counts
 from vdet.traffic.records import VehicleRecord
-from vdet.workers import core_count
+from vdet.workers import core_count, read_async
 
 if TYPE_CHECKING:
     from vdet.labels.label import SourceVideo
@@ -259,7 +258,7 @@ class Results(Iterator[FrameResult]):
             if self._with_traffic:
                 traffic.end(findings_in(self.facts))
                 if self.corrections and (counted := traffic.counted):
-                    from vdet.review.correcting import correct  # most runs load nothing of it
+                    from vdet.review.corrections import correct  # most runs load nothing of it
 
                     traffic.revise(correct({"": counted}, {"": self.corrections}, settings)[""])
                 if counts := traffic.counts():

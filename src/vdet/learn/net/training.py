@@ -26,9 +26,8 @@ from vdet.learn.net.network import (
     start_from,
 )
 from vdet.learn.net.sources import NetSample, NetSource, join
-from vdet.run.threads import SearchThreads
 from vdet.version import __version__
-from vdet.workers import core_count
+from vdet.workers import SearchThreads, core_count
 
 CHECKPOINT = 500
 """Steps between two checkpoints."""

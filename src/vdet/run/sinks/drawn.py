@@ -25,9 +25,8 @@ from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
 from vdet.run.sinks.protocol import SinkContext, SinkKind, Writing, sink_function
 from vdet.run.steps import FrameResult
-from vdet.run.threads import write_async
 from vdet.track.track import Track
-from vdet.workers import core_count
+from vdet.workers import core_count, write_async
 
 if TYPE_CHECKING:
     from vdet.traffic.counter import VehicleCounter

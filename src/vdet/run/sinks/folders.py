@@ -336,7 +336,7 @@ def write_review(path: Path, context: SinkContext) -> Writing:
     if not context.settings.traffic:
         raise OutputError(f"{path}: no lines or zones to review; add them to the settings")
     from vdet.review.page import ReviewRecorder  # most runs load nothing of it
-    from vdet.review.traces import with_traces
+    from vdet.review.strips import with_traces
 
     (video, traffic), facts = context.of_video, context.facts
     assert traffic.counter  # the settings have lines or zones
