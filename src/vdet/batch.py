@@ -1,14 +1,10 @@
-"""Batches of videos: each file, and all of them.
-
-One file of a batch: the digest of its result, whether it is done, and its record.
+"""Batches of videos: find them, plan a run for each, process it, and keep its record.
 
 The manifest has a line of JSON for every file, added as soon as the file is done. The worker writes
 the record of a file as a note into a hidden folder of the batch, just before the outputs are
 renamed. The note moves into the manifest when the file is done; if the batch is interrupted, when
 it ends, and if it is killed, when the next one ends. So a batch never has outputs without their
 record.
-
-Plan and run a batch: find its videos, process each, and write its record when it is done.
 """
 
 import errno
@@ -53,6 +49,18 @@ from vdet.workers import Workers, call_all, limit_library_threads
 
 MANIFEST = "manifest.jsonl"
 _NOTES = ".vdet-notes"
+
+VIDEO_INPUT_SUFFIXES = frozenset((
+    ".264", ".265", ".3g2", ".3gp", ".asf", ".avi", ".dav", ".dv", ".f4v", ".flv", ".h264", ".h265",
+    ".hevc", ".insv", ".m2t", ".m2ts", ".m2v", ".m4v", ".mjpeg", ".mjpg", ".mkv", ".mov", ".mp4",
+    ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m",
+))  # fmt: skip
+"""Suffixes of videos in a folder. A file passed by name may have any suffix."""
+
+DRAWN = ".vdet"
+"""Part before the suffix in the name of a video written beside its source."""
+_log = logging.getLogger("vdet")
+_KILLED = "{}: its process was killed or crashed; it may have run out of memory"
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,19 +390,6 @@ def _collected_warnings() -> Iterator[list[str]]:
         log.removeFilter(collect)
 
 
-_log = logging.getLogger("vdet")
-
-VIDEO_INPUT_SUFFIXES = frozenset((
-    ".264", ".265", ".3g2", ".3gp", ".asf", ".avi", ".dav", ".dv", ".f4v", ".flv", ".h264", ".h265",
-    ".hevc", ".insv", ".m2t", ".m2ts", ".m2v", ".m4v", ".mjpeg", ".mjpg", ".mkv", ".mov", ".mp4",
-    ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m",
-))  # fmt: skip
-"""Suffixes of videos in a folder. A file passed by name may have any suffix."""
-
-DRAWN = ".vdet"
-"""Part before the suffix in the name of a video written beside its source."""
-
-
 @dataclass(frozen=True, slots=True)
 class InputVideo:
     """A video, and its path relative to the input folder."""
@@ -473,9 +468,6 @@ def _is_video(path: Path) -> bool:
 
 def _reject_unreadable(error: OSError) -> None:
     raise BatchError(f"{error.filename}: cannot be read: {error.strerror}; remove it") from error
-
-
-_KILLED = "{}: its process was killed or crashed; it may have run out of memory"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,4 @@
-"""What a camera needs before it counts: its lens, its lines and zones.
-
-`vdet calibrate`: from photographs of a chessboard to a camera file.
-
-`vdet draw`: a page for drawing lines over the paths of vehicles.
-"""
+"""`vdet calibrate` and `vdet draw`: the lens of a camera, and its lines and zones."""
 
 from fractions import Fraction
 from pathlib import Path

@@ -1,9 +1,4 @@
-"""Counts of saved tracks, and the page on which they are checked.
-
-`vdet count`: count the vehicles of track files at lines and in zones.
-
-`vdet review`: the strips of lines, from a video and its saved tracks, and what was checked.
-"""
+"""`vdet count` and `vdet review`: counts of saved tracks, and the page of their review."""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction

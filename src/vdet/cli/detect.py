@@ -1,9 +1,4 @@
-"""Vehicles in images and in videos.
-
-`vdet detect-image`: find vehicles in images.
-
-`vdet detect-video`: find and follow vehicles in one video, or in many.
-"""
+"""`vdet detect-image` and `vdet detect-video`: find vehicles in images, in one video or in many."""
 
 import re
 import shlex
@@ -26,6 +21,12 @@ if TYPE_CHECKING:
     from vdet.batch import ManifestRecord
     from vdet.run.steps import FrameResult
     from vdet.run.video import Run
+
+STAGE_MARGIN = Fraction(2)
+"""Seconds to process before and after `--at`, for detector and tracker."""
+_VIDEO_OR_NONE = "pass either OUT or --no-video; for several videos, add -d DIR"
+_ENDING = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
+"""The ending of an output's name, such as `.csv` or `.cars.csv`."""
 
 
 @command()
@@ -106,13 +107,6 @@ def _print_vehicles(result: "FrameResult") -> None:
         box = ", ".join(map(str, track.box.xywh))
         rows.append(f"  {track.class_name or 'vehicle':8} {track.score:.2f}  {box}")
     print_lines(f"{result.source}: {quantity(len(rows), 'vehicle')}", *rows)
-
-
-STAGE_MARGIN = Fraction(2)
-"""Seconds to process before and after `--at`, for detector and tracker."""
-_VIDEO_OR_NONE = "pass either OUT or --no-video; for several videos, add -d DIR"
-_ENDING = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
-"""The ending of an output's name, such as `.csv` or `.cars.csv`."""
 
 
 @command()

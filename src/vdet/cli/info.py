@@ -1,9 +1,4 @@
-"""What is installed, which settings there are, and a demo.
-
-`vdet info` describes models, cameras and this machine; `vdet config` prints settings.
-
-`vdet demo`: the whole program on synthetic roads.
-"""
+"""`vdet info`, `vdet config` and `vdet demo`: what is installed, and which settings there are."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,7 @@
-"""The page of `vdet count`: all files of a camera, such as those of a day."""
+"""Lines, zones, counts, flows and paths over a frame; the page of `vdet count`.
+
+That page is about all files of a camera, such as those of a day.
+"""
 
 import math
 from collections import Counter
@@ -28,6 +31,17 @@ from vdet.traffic.survey import Survey
 
 _INTERVAL = 900
 """Seconds of an interval of the chart, unless the settings have one."""
+
+_WIDEST = 0.012
+"""Width of the arrow of the largest flow, as a fraction of the frame's width."""
+_SIDE = 0.04
+"""Length of the arrows to the sides of a line, as a fraction of the frame's height."""
+_SHORTEST = 0.03
+"""Minimum length of a path to draw, as a fraction of the frame's width."""
+_TIP = 0.012
+"""Minimum length of the tip of an arrow, as a fraction of the frame's width."""
+_SHADE = 0.18
+"""Opacity of the colour over a zone."""
 
 
 def counts_page(survey: Survey, picture: Image | None = None) -> str:
@@ -69,18 +83,6 @@ def _plot(survey: Survey, length: int) -> Plot | None:
     to_clock = tally.intervals.to_clock
     x = time_axis(first.number, last.number + length, to_clock)
     return interval_plot(series, x, length, "Vehicles by interval", to_clock)
-
-
-_WIDEST = 0.012
-"""Width of the arrow of the largest flow, as a fraction of the frame's width."""
-_SIDE = 0.04
-"""Length of the arrows to the sides of a line, as a fraction of the frame's height."""
-_SHORTEST = 0.03
-"""Minimum length of a path to draw, as a fraction of the frame's width."""
-_TIP = 0.012
-"""Minimum length of the tip of an arrow, as a fraction of the frame's width."""
-_SHADE = 0.18
-"""Opacity of the colour over a zone."""
 
 
 @dataclass(frozen=True, slots=True)

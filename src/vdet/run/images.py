@@ -1,9 +1,4 @@
-"""Single images: the files that a command reads, and the search of images.
-
-The files that a command reads, which none of its outputs may replace.
-
-Vehicles in single images: read the image, detect, pass the result to the sinks.
-"""
+"""Single images: read, searched, and passed to the sinks; and the files that commands read."""
 
 import logging
 import os
@@ -31,6 +26,9 @@ from vdet.workers import SearchThreads
 _DATA_SUFFIXES = IMAGE_SUFFIXES | {".csv", ".json", ".txt", ".yaml", ".yml"}
 
 
+_log = logging.getLogger("vdet")
+
+
 def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
     """Identify the files at `paths`, and the model file, masks and picture of the settings.
 
@@ -50,9 +48,6 @@ def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
         named = [settings.detector.model, settings.survey.picture, *masks]
         files += map(Path, filter(None, named))
     return file_ids(files)
-
-
-_log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)

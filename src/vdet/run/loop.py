@@ -1,10 +1,4 @@
-"""One video: the search of its frames, and the loop from frames to results.
-
-Where nothing moves, fewer frames are searched, if the detector is stateless. The search of a
-segment has two phases: first its last frame, the key frame, then the frames between two key frames,
-if these differ.
-
-The loop: frames → detector → tracker → steps → results.
+"""One video: from its frames to results.
 
 `build` makes the `Pipeline` of a video, and `Pipeline.follow` passes its frames through:
 
@@ -12,6 +6,10 @@ The loop: frames → detector → tracker → steps → results.
 2. `observe`, in the order of the frames: the detections go to the tracker;
 3. a delay of `look_ahead` seconds of video, so that the tracker knows later detections;
 4. `complete`: the tracks at the time of the frame, and then every step.
+
+Where nothing moves, fewer frames are searched, if the detector is stateless. The search of a
+segment has two phases: first its last frame, the key frame, then the frames between two key frames,
+if these differ.
 """
 
 import itertools
@@ -55,6 +53,25 @@ With 12 searches per second, every second frame is searched at 23.976 frames/s, 
 same way, `MAX_KEY_INTERVAL` may be exceeded by this fraction of the usual distance between
 searches.
 """
+
+MAX_KEY_INTERVAL = 0.25
+"""Maximum time between the searches of two key frames, seconds.
+
+In the project video, with none, 630 frames are searched instead of 570, and a run takes 13 % more
+processor time.
+"""
+_MAX_SEGMENT = 16
+"""Maximum number of frames of a segment: they are in memory together."""
+_MIN_SCORE = 0.15
+"""Minimum score of the boxes by which two key frames are compared."""
+_SAME_IOU = 0.9
+"""Minimum intersection over union of two boxes in the same place."""
+FIRST_FRAMES = 2
+"""Number of frames passed to `DetectorModel.for_video`."""
+_MAX_WAITING = 60
+"""Maximum number of frames in memory that wait for later ones."""
+_DECIDED = Fraction(2)
+"""Seconds of later frames that decide whether a track is of the selected classes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,23 +124,6 @@ class SearchRate:
         longest = 1 / self.searches
         distance = max(1, int(longest / usual + _TOLERANCE))  # frames
         return since_search >= min((distance - 0.5) * usual, longest)
-
-
-MAX_KEY_INTERVAL = 0.25
-"""Maximum time between the searches of two key frames, seconds.
-
-In the project video, with none, 630 frames are searched instead of 570, and a run takes 13 % more
-processor time.
-"""
-
-_MAX_SEGMENT = 16
-"""Maximum number of frames of a segment: they are in memory together."""
-
-_MIN_SCORE = 0.15
-"""Minimum score of the boxes by which two key frames are compared."""
-
-_SAME_IOU = 0.9
-"""Minimum intersection over union of two boxes in the same place."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,16 +246,6 @@ def search_frames(
             yield from finished
             finished = chain((future.result() for future in between), [last])
         yield from finished
-
-
-FIRST_FRAMES = 2
-"""Number of frames passed to `DetectorModel.for_video`."""
-
-_MAX_WAITING = 60
-"""Maximum number of frames in memory that wait for later ones."""
-
-_DECIDED = Fraction(2)
-"""Seconds of later frames that decide whether a track is of the selected classes."""
 
 
 @dataclass(frozen=True, slots=True)

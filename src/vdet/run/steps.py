@@ -1,8 +1,4 @@
-"""The result of a frame, and the steps that change it.
-
-The result of one frame, and the facts that steps add to it.
-
-Steps, which run between the tracker and the sinks, and those that vdet provides.
+"""The result of a frame, and the steps that change it, between the tracker and the sinks.
 
 A step is made for one video or one image. An entry point of the group `vdet.steps` is a function
 that takes a `StepContext` and returns a step, or None if the settings do not enable it.
@@ -34,6 +30,13 @@ if TYPE_CHECKING:
     from vdet.conditions.watch import Conditions
     from vdet.lanes.road import Road, RoadFinder
 
+_CELL = 0.01
+"""Side of the cells in which vehicles drove, as a fraction of the width."""
+_KEYS = {"frame", "time", "tracks", "clock", "video", "findings", "last", "image", "boxes"}
+"""Keys of a record, which no fact about a frame may have."""
+FINDINGS = "conditions"
+"""Name of the fact that has the reasons to doubt the results of a video."""
+
 
 class Fact(Protocol):
     """A result of a step about a frame or a whole video: a frozen value of any type.
@@ -47,13 +50,6 @@ class Fact(Protocol):
 
 Facts = Mapping[str, Fact]
 """Facts by their names, which are their keys in JSON."""
-
-FINDINGS = "conditions"
-"""Name of the fact that has the reasons to doubt the results of a video."""
-
-
-_KEYS = {"frame", "time", "tracks", "clock", "video", "findings", "last", "image", "boxes"}
-"""Keys of a record, which no fact about a frame may have."""
 
 
 def findings_in(facts: Facts) -> Findings:
@@ -128,10 +124,6 @@ class FrameResult:
         image = self.frame.image.copy()
         self.draw_tracks(image, ("id", "class"))
         return cv2.imencode(".png", image)[1].tobytes()
-
-
-_CELL = 0.01
-"""Side of the cells in which vehicles drove, as a fraction of the width."""
 
 
 class Step(Protocol):
