@@ -122,25 +122,14 @@ def _write(output: "Output", files: OutputFiles, survey: "Survey", scene: "Image
     """Write a table, a workbook or a page; `scene` is the picture of the settings."""
     from vdet.pages.render import PAGE_NAME
     from vdet.pages.traffic import counts_page, scene_picture
-    from vdet.traffic.output import (
-        counts_content,
-        flows_content,
-        is_workbook,
-        write_content,
-        write_workbook,
-    )
+    from vdet.run.sinks.data import write_tables
 
-    traffic = survey.settings.traffic
     if scene is not None:
-        scene = scene_picture(scene, traffic, survey.counts)
+        scene = scene_picture(scene, survey.settings.traffic, survey.counts)
     if output.sink == "page":
         page = files.stage_folder(output.path) / PAGE_NAME
         return write_text(page, counts_page(survey, scene))
-    path = files.stage(output.path)
-    if is_workbook(output.path):
-        return write_workbook(path, survey.sheets(scene))
-    content = {"counts": counts_content, "flows": flows_content}[output.sink]
-    return write_content(path, content(output.path, survey.videos, traffic.seconds))
+    return write_tables(survey, output.sink, output.path, files, scene)
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:

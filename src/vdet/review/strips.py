@@ -12,13 +12,13 @@ nothing is counted by it.
 
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import reduce
 from statistics import median
 
 import cv2
 import numpy as np
-import numpy.typing as npt
+from cv2.typing import MatLike
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array, Image, Int64Array
 from vdet.errors import clock_text, quantity
@@ -141,15 +141,6 @@ class BandPassage:
     width: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Foot:
-    """The foot of a track in a frame: number of the frame, seconds, pixels."""
-
-    index: int
-    time: float
-    point: Point
-
-
 class Passages:
     """Records where the feet of tracks pass bands, frame by frame.
 
@@ -161,55 +152,37 @@ class Passages:
 
     def __init__(self, bands: Sequence[Band]) -> None:
         self._bands = bands
-        self._feet: dict[int, deque[_Foot]] = {}
+        self._latest: dict[int, deque[tuple[FrameTracks, Track]]] = {}
         self.by_band: list[list[BandPassage]] = [[] for _ in bands]
 
     def add(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
         shown = {track.id for track in frame.tracks}
-        self._feet = {key: feet for key, feet in self._feet.items() if key in shown}
+        self._latest = {key: items for key, items in self._latest.items() if key in shown}
         for track in frame.tracks:
-            feet = self._feet.setdefault(track.id, deque())
-            feet.append(_Foot(frame.index, frame.time, track.foot))
-            while frame.time - feet[0].time > _HISTORY:
-                feet.popleft()
-            if len(feet) > 1:
-                self._pass(track, feet)
+            latest = self._latest.setdefault(track.id, deque())
+            latest.append((frame, track))
+            while frame.time - latest[0][0].time > _HISTORY:
+                latest.popleft()
+            if len(latest) > 1:
+                self._pass(latest)
 
-    def _pass(self, track: Track, feet: Sequence[_Foot]) -> None:
-        before, now = feet[-2], feet[-1]
-        step, frames = (before.point, now.point), now.index - feet[0].index
+    def _pass(self, latest: Sequence[tuple[FrameTracks, Track]]) -> None:
+        """Add the passages between the last two of the latest frames with a track."""
+        (first, start), (before, previous), (now, track) = latest[0], latest[-2], latest[-1]
+        step, frames = (previous.foot, track.foot), now.index - first.index
         for band, passages in zip(self._bands, self.by_band, strict=True):
             way = meeting(step, (band.start, band.end))
             if way is not None:
                 position = meeting((band.start, band.end), step) or 0.0
-                x, y = (np.subtract(now.point, feet[0].point) / frames).tolist()
+                x, y = (np.subtract(track.foot, start.foot) / frames).tolist()
                 time = before.time + way * (now.time - before.time)
                 passages.append(BandPassage(track.id, time, position, (x, y), track.box.width))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Map:
-    """Where pixels lie in a layer, in the form that `cv2.remap` reads fastest."""
-
-    pixels: npt.NDArray[np.int16]
-    fractions: npt.NDArray[np.uint16]
-
-    @classmethod
-    def of(cls, x: Float64Array, y: Float64Array) -> "_Map":
-        maps = cv2.convertMaps(x.astype(np.float32), y.astype(np.float32), cv2.CV_16SC2)
-        return cls(np.asarray(maps[0], np.int16), np.asarray(maps[1], np.uint16))
-
-    def cut(self, layer: Image) -> Image:
-        """Return the pixels of a layer."""
-        edge = cv2.BORDER_REPLICATE
-        cut = cv2.remap(layer, self.pixels, self.fractions, cv2.INTER_LINEAR, borderMode=edge)
-        return np.asarray(cut, np.uint8)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Sampling:
-    """Where the pixels of a band lie in a frame.
+    """Where the pixels of a band lie in a frame, and in its chroma, as `cv2.remap` takes it.
 
     Attributes
     ----------
@@ -221,14 +194,8 @@ class Sampling:
 
     rows: int
     is_upward: bool
-    _full: _Map
-    _half: _Map
-
-    @classmethod
-    def of(cls, x: Float64Array, y: Float64Array, *, is_upward: bool) -> "Sampling":
-        """Sample at x and y, `(rows, samples)` each, pixels of the frame."""
-        half = _Map.of((x - 0.5) / 2, (y - 0.5) / 2)
-        return cls(len(x), is_upward, _Map.of(x, y), half)
+    _full: tuple[MatLike, MatLike]
+    _half: tuple[MatLike, MatLike]
 
     def cut(self, layers: Sequence[Image]) -> Image:
         """Return the band of a frame as luma, blue and red, uint8 `(rows, samples, 3)`.
@@ -236,11 +203,17 @@ class Sampling:
         The layers are the frame, BGR, or its luma, blue and red.
         """
         first, *chroma = layers
-        cut = self._full.cut(first)
+        cut = _remapped(first, self._full)
         if not chroma:
             return np.asarray(cv2.cvtColor(cut, cv2.COLOR_BGR2YCrCb)[..., [0, 2, 1]], np.uint8)
-        merged = cv2.merge([cut, *map(self._half.cut, chroma)])
+        merged = cv2.merge([cut, *(_remapped(layer, self._half) for layer in chroma)])
         return np.asarray(merged, np.uint8)
+
+
+def _remapped(layer: Image, maps: tuple[MatLike, MatLike]) -> Image:
+    """Return the pixels of a layer that lie where two maps say."""
+    cut = cv2.remap(layer, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(cut, np.uint8)
 
 
 def sampling_of(band: Band, passages: Sequence[BandPassage]) -> Sampling:
@@ -259,7 +232,11 @@ def sampling_of(band: Band, passages: Sequence[BandPassage]) -> Sampling:
     offsets = 0.5 - (np.arange(rows) + 0.5) / rows  # what is ahead has passed earlier
     x, y = np.moveaxis(points + offsets[:, np.newaxis, np.newaxis] * velocities, 2, 0)
     is_upward = bool(np.median(velocities[:, 1]) > 0)
-    return Sampling.of(x, y, is_upward=is_upward)
+    full, half = (
+        cv2.convertMaps(a.astype(np.float32), b.astype(np.float32), cv2.CV_16SC2)
+        for a, b in ((x, y), ((x - 0.5) / 2, (y - 0.5) / 2))
+    )
+    return Sampling(rows, is_upward, full, half)
 
 
 def _velocities(
@@ -280,19 +257,6 @@ def _velocities(
     return np.asarray(np.where(speeds < _SLOW, most * _SLOW * normal, means))
 
 
-@dataclass(frozen=True, slots=True)
-class _StripPassage:
-    """A tracked vehicle in a strip: position and width, columns, and number of frames.
-
-    `passed` is when its foot passed, as a fraction of these frames.
-    """
-
-    position: float
-    width: float
-    frames: float
-    passed: float
-
-
 class TraceSearch:
     """Looks for the traces at a band, minute by minute; `number` is that of the band."""
 
@@ -301,7 +265,7 @@ class TraceSearch:
         self._band = band
         self._frames: list[FrameTracks] = []
         self._rows: list[Image] = []
-        self._crossings: deque[_StripPassage] = deque(maxlen=_LATEST)
+        self._crossings: deque[Float64Array] = deque(maxlen=_LATEST)
         self._searched = -np.inf
 
     def search(
@@ -350,7 +314,7 @@ class TraceSearch:
 
     def _feet(self, is_free: BoolArray) -> Iterator[tuple[int, float]]:
         """Yield the row and column of the foot of each trace in the frames at hand."""
-        positions, widths, frames, passed = np.array([astuple(item) for item in self._crossings]).T
+        positions, widths, frames, passed = np.array(self._crossings).T
         away = np.abs(np.arange(self._band.samples) + 0.5 - positions[:, np.newaxis])
         is_driven = (away <= widths[:, np.newaxis] / 2).any(axis=0)
         difference, factors = _differences(self._rows, is_free)
@@ -391,14 +355,16 @@ def _ids(band: Band, frames: Sequence[FrameTracks]) -> Int64Array:
     return ids
 
 
-def _crossing(shown: BoolArray, row: int, position: float) -> _StripPassage:
-    """Return how a vehicle crosses that covers a part of a strip, and whose foot is at a row."""
+def _crossing(shown: BoolArray, row: int, position: float) -> Float64Array:
+    """Return how a vehicle crosses that covers a part of a strip, and whose foot is at a row.
+
+    The array has its position and width, columns, its number of frames, and when its foot passed,
+    as a fraction of these frames.
+    """
     rows = np.flatnonzero(shown.any(axis=1))
     width = shown.sum(axis=1).max() / (1 + 2 * _MARGIN)
     frames = (rows[-1] - rows[0] + 1) / (1 + 2 * _MARGIN)
-    return _StripPassage(
-        position, float(width), float(frames), float((row - rows[0]) / frames - _MARGIN)
-    )
+    return np.array([position, width, frames, (row - rows[0]) / frames - _MARGIN])
 
 
 def _are_shadow(factors: Float32Array) -> bool:

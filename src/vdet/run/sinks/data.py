@@ -11,8 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from vdet.boxes import Image
 from vdet.errors import OutputError
-from vdet.files import json_text, print_now, valid_text, write_text
+from vdet.files import OutputFiles, json_text, print_now, valid_text, write_text
 from vdet.findings import AT_LINES, without
 from vdet.labels.coco import COCO, write_coco_images
 from vdet.labels.images import LabelledImage
@@ -28,7 +29,6 @@ from vdet.pages.traffic import scene_picture, survey_image
 from vdet.run.sinks.protocol import (
     STANDARD_OUTPUT,
     BatchTotal,
-    Sink,
     SinkContext,
     SinkKind,
     Writing,
@@ -39,9 +39,8 @@ from vdet.traffic import output
 from vdet.traffic.counter import source_video
 from vdet.traffic.output import SUFFIXES, check_table, write_content, write_workbook
 from vdet.traffic.records import join_records, records_content
+from vdet.traffic.survey import Survey
 from vdet.version import __version__
-
-MakeContent = Callable[[Path, output.Videos, int | None], Any]
 
 
 @sink_function
@@ -189,42 +188,44 @@ VEHICLES = SinkKind(
 )
 
 
-@sink_function
-def _write_workbook(path: Path, context: SinkContext) -> Writing:
-    """Write the workbook, with the frame that shows the most vehicles."""
-    given = survey_image(context.settings)
-    while result := (yield):
-        context.poster.add(result)
-    survey, (_, traffic) = context.survey, context.of_video
-    image = context.poster.image(traffic.vehicles) if given is None else given
-    assert survey  # the settings have lines or zones
-    assert image is not None  # a run has frames
-    paths = {vehicle.id: vehicle.path for vehicle in traffic.vehicles}
-    picture = scene_picture(image, survey.settings.traffic, survey.counts, paths)
-    write_workbook(context.files.stage(path), survey.sheets(picture))
+_CONTENTS = {"counts": output.counts_content, "flows": output.flows_content}
 
 
-def _open_counts(make: MakeContent, path: Path, context: SinkContext) -> Sink:
-    """Return a sink of the counts at lines and in zones, or of the flows.
+def write_tables(
+    survey: Survey, name: str, path: Path, files: OutputFiles, picture: Image | None
+) -> None:
+    """Write the `counts` or `flows` of a survey; the ending of the name selects the table.
 
-    `make` is `counts_content` or `flows_content`; the ending of the name selects the table.
+    A workbook has everything, and the picture of the scene.
     """
-    settings = context.settings.traffic
-    if not settings:
-        raise OutputError(f"{path}: no lines or zones to count at; add them to the settings")
-
-    def content(path: Path, context: SinkContext) -> Any:
-        assert context.survey  # the settings have lines or zones
-        return make(path, context.survey.videos, settings.seconds)
-
     if output.is_workbook(path):
-        return _write_workbook(path, context)
-    return sink_function(_write_table)(content, path, context)
+        return write_workbook(files.stage(path), survey.sheets(picture))
+    content = _CONTENTS[name](path, survey.videos, survey.settings.traffic.seconds)
+    return write_content(files.stage(path), content)
 
 
-COUNTS = SinkKind(
-    partial(_open_counts, output.counts_content), output.COUNT_SUFFIXES, "counts", takes="videos"
-)
-FLOWS = SinkKind(
-    partial(_open_counts, output.flows_content), output.FLOW_SUFFIXES, "flows", takes="videos"
-)
+@sink_function
+def _write_counts(name: str, path: Path, context: SinkContext) -> Writing:
+    """Write the counts at lines and in zones, or the flows, at the end.
+
+    A workbook has the frame that shows the most vehicles, or the picture of the settings.
+    """
+    if not context.settings.traffic:
+        raise OutputError(f"{path}: no lines or zones to count at; add them to the settings")
+    is_workbook, (_, traffic) = output.is_workbook(path), context.of_video
+    scene = survey_image(context.settings) if is_workbook else None
+    while result := (yield):
+        if is_workbook:
+            context.poster.add(result)
+    survey, picture = context.survey, None
+    assert survey  # the settings have lines or zones
+    if is_workbook:
+        image = context.poster.image(traffic.vehicles) if scene is None else scene
+        assert image is not None  # a run has frames
+        paths = {vehicle.id: vehicle.path for vehicle in traffic.vehicles}
+        picture = scene_picture(image, survey.settings.traffic, survey.counts, paths)
+    write_tables(survey, name, path, context.files, picture)
+
+
+COUNTS = SinkKind(partial(_write_counts, "counts"), output.COUNT_SUFFIXES, "counts", takes="videos")
+FLOWS = SinkKind(partial(_write_counts, "flows"), output.FLOW_SUFFIXES, "flows", takes="videos")
