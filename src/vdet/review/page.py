@@ -5,6 +5,7 @@ from base64 import b64encode
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, field
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from typing import Any, Literal, Self, TextIO
@@ -17,10 +18,8 @@ from markupsafe import Markup
 from vdet import draw
 from vdet.boxes import Box, Image
 from vdet.config.classes import STANDARD_CLASSES
-from vdet.config.scene import TrafficSettings
 from vdet.config.schema import Settings
 from vdet.files import valid_text
-from vdet.findings import Finding
 from vdet.media import Picture, VideoInfo
 from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
@@ -127,31 +126,44 @@ class EventMark:
     moment: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Review:
     """What the page shows.
 
     Attributes
     ----------
-    counted
-        The counts before corrections, with a mark for each event.
-    opened
-        The counts with the corrections that the page opens, of the file `reviewed`; None: none.
-    added
-        The marks of the events that these add.
+    counted, counts
+        The counts before corrections, with a mark for each event, and at the end, with traces.
+    reviewed
+        The corrections that the page opens; None: none.
     """
 
     video: VideoInfo
-    traffic: TrafficSettings
-    bands: Sequence[Band]
+    settings: Settings
+    passages: Passages
     pictures: Sequence[StripPicture]
-    marks: Sequence[EventMark]
-    traces: Sequence[Trace]
     counted: Counts
-    findings: Sequence[Finding] = ()
-    opened: Corrected | None = None
-    reviewed: Corrections | None = None
-    added: Sequence[EventMark] = ()
+    counts: Counts
+    reviewed: Corrections | None
+
+    @cached_property
+    def opened(self) -> Corrected | None:
+        """The counts of all classes with the corrections; None without any."""
+        if not self.reviewed:
+            return None
+        settings = self.settings.model_copy(update={"classes": ()})
+        return correct({"": self.counted}, {"": self.reviewed}, settings)[""].corrected
+
+    @cached_property
+    def marks(self) -> list[EventMark]:
+        """Where the counted events are."""
+        return self._marks(self.counted.events)
+
+    @cached_property
+    def added(self) -> list[EventMark]:
+        """The marks of the events that the corrections add."""
+        every = self.opened.corrections if self.opened else ()
+        return self._marks([item.right for item in every if item.right and not item.counted])
 
     @property
     def moments(self) -> list[str]:
@@ -162,7 +174,7 @@ class Review:
             return 1.0 if mark.event.score is None else mark.event.score
 
         def is_doubtful(mark: EventMark) -> bool:
-            is_beside = _is_beside(mark.band, mark.event.time, self.traces)
+            is_beside = _is_beside(mark.band, mark.event.time, self.counts.traces)
             return is_beside or score(mark) < _UNSURE or mark.event in corrected
 
         hours = 1 + int(self.counted.spans[-1][1] // 3600)
@@ -175,6 +187,23 @@ class Review:
         seen = [astuple(mark) for mark in (*self.marks, *self.added)], self.reviewed
         path = valid_text(str(self.video.path.resolve()))
         return f"vdet review {path} {crc32(repr(seen).encode())}"
+
+    def write(self, file: TextIO, folder: Path, index: str) -> None:
+        """Write the page. `folder` has its pictures, WebP files; a vehicle may have none.
+
+        `index` is the address of the list of all reviews of a batch; empty without one.
+        """
+        scripts = [Markup((TEMPLATES / name).read_text("utf-8")) for name in _SCRIPTS]
+        values = {"review": self, "data": self.data(), "index": index}
+        before, _, after = render("review.html", scripts=scripts, **values).partition(_PICTURES)
+        file.write(before)
+        crops = sorted({crop_name(mark.event.id) for mark in self.marks})
+        names = "scene-picture", *(item.name for item in self.pictures), *crops, *self.moments
+        for path in (folder / name for name in names):
+            if path.exists():
+                data = b64encode(path.read_bytes()).decode("ascii")
+                file.write(f'<script type="text/plain" id="{path.name}">{data}</script>\n')
+        file.write(after)
 
     def data(self) -> dict[str, Any]:
         """Return the values for the script of the page."""
@@ -192,11 +221,11 @@ class Review:
             "limit": MAX_BYTES,
             "key": self.key,
             "clock": clock and 3600 * clock.hour + 60 * clock.minute + clock.second,
-            "zones": [zone.name for zone in self.traffic.zones],
-            "bands": [{**asdict(band), "samples": band.samples} for band in self.bands],
+            "zones": [zone.name for zone in self.settings.traffic.zones],
+            "bands": [{**asdict(band), "samples": band.samples} for band in self.passages.bands],
             "pictures": [asdict(picture) for picture in self.pictures],
             "marks": [{**_values(mark), "id": mark.event.id} for mark in self.marks],
-            "traces": [asdict(trace) for trace in self.traces],
+            "traces": [asdict(trace) for trace in self.counts.traces],
             "classes": [*STANDARD_CLASSES, *sorted(unlisted)],
             "spans": [{"number": n, "start": a, "end": b} for n, (a, b) in spans.items()],
             "strata": strata_of(traffic).tolist(),
@@ -208,7 +237,7 @@ class Review:
 
     def _head(self) -> dict[str, Any]:
         """Return what a file of corrections says of its video and of the lines."""
-        shapes = self.traffic.for_frames(self.video.width, self.video.height)
+        shapes = self.settings.traffic.for_frames(self.video.width, self.video.height)
         fields = {"name", "start", "end", "left", "right", "points"}
         source = self.counted.source
         start = round(self.counted.spans[0][0], 3)
@@ -241,6 +270,29 @@ class Review:
             "sample": self.reviewed.sample and self.reviewed.sample.model_dump(),
         }
 
+    def _marks(self, events: Sequence[Event]) -> list[EventMark]:
+        """Return where events are."""
+        passed = defaultdict[tuple[int, int], list[BandPassage]](list)
+        for number, passages in enumerate(self.passages.by_band):
+            for passage in passages:
+                passed[number, passage.id].append(passage)
+        marks = []
+        for event in events:
+            bands = [
+                number
+                for number, band in enumerate(self.passages.bands)
+                if band.name == event.name and event.direction in band.directions
+            ]
+            near = ((band, passage) for band in bands for passage in passed[band, event.id])
+            spots = [
+                (abs(p.time - event.time), band, p.position, _moment_name(band, p))
+                for band, p in near
+            ]
+            spots += [(_SAME, band, 0.5, "") for band in bands]  # if there is no passage
+            _, band, position, moment = min(spots, default=(0.0, None, 0.5, ""))
+            marks.append(EventMark(band, round(position, 3), event, moment))
+        return marks
+
 
 def _values(mark: EventMark) -> dict[str, Any]:
     """Return a mark for the script of the page."""
@@ -248,25 +300,6 @@ def _values(mark: EventMark) -> dict[str, Any]:
     place = {"band": mark.band, "seconds": round(event.time, 3), "position": mark.position}
     names = {"line": event.name, "direction": event.direction, "class": class_of(event)}
     return place | names | {"vehicle": event.vehicle, "moment": mark.moment}
-
-
-def write_review(file: TextIO, review: Review, folder: Path, index: str) -> None:
-    """Write the page. `folder` has its pictures, WebP files; a vehicle may have none.
-
-    `index` is the address of the list of all reviews of a batch; empty without one.
-    """
-    scripts = [Markup((TEMPLATES / name).read_text("utf-8")) for name in _SCRIPTS]
-    values = {"review": review, "data": review.data(), "index": index}
-    page = render("review.html", scripts=scripts, **values)
-    before, _, after = page.partition(_PICTURES)
-    file.write(before)
-    crops = sorted({crop_name(mark.event.id) for mark in review.marks})
-    names = "scene-picture", *(item.name for item in review.pictures), *crops, *review.moments
-    for path in (folder / name for name in names):
-        if path.exists():
-            data = b64encode(path.read_bytes()).decode("ascii")
-            file.write(f'<script type="text/plain" id="{path.name}">{data}</script>\n')
-    file.write(after)
 
 
 @dataclass(slots=True)
@@ -360,28 +393,19 @@ class ReviewRecorder:
     def write(self, path: Path, counted: Counts, counts: Counts, index: str) -> dict[str, Any]:
         """Write the page, and return what `reviews.html` says of it.
 
-        `counted` are the counts before corrections; `index` as for `write_review`.
+        `counted` are the counts before corrections; `index` as for `Review.write`.
         """
-        opened, corrections = None, self._corrections
-        if corrections:
-            settings = self._settings.model_copy(update={"classes": ()})
-            opened = correct({"": counted}, {"": corrections}, settings)[""].corrected
-        every = opened.corrections if opened else ()
         review = Review(
             video=self._video,
-            traffic=self._settings.traffic,
-            bands=[strip.band for strip in self._strips],
+            settings=self._settings,
+            passages=self._passages,
             pictures=self._pictures,
-            marks=self._marks(counted.events),
-            traces=counts.traces,
-            findings=counts.findings,
             counted=counted,
-            opened=opened,
-            reviewed=corrections,
-            added=self._marks([item.right for item in every if item.right and not item.counted]),
+            counts=counts,
+            reviewed=self._corrections,
         )
         with path.open("w", encoding="utf-8", errors="backslashreplace") as file:
-            write_review(file, review, Path(self._folder.name), index)
+            review.write(file, Path(self._folder.name), index)
         return {
             "key": review.key,
             "vehicles": len({event.vehicle for event in counted.events}),
@@ -486,26 +510,3 @@ class ReviewRecorder:
     def _write(self, name: str, image: Image) -> None:
         _, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
         (Path(self._folder.name) / name).write_bytes(data.tobytes())
-
-    def _marks(self, events: Sequence[Event]) -> list[EventMark]:
-        """Return where the counted events are."""
-        passed = defaultdict[tuple[int, int], list[BandPassage]](list)
-        for number, passages in enumerate(self._passages.by_band):
-            for passage in passages:
-                passed[number, passage.id].append(passage)
-        marks = []
-        for event in events:
-            bands = [
-                number
-                for number, strip in enumerate(self._strips)
-                if strip.band.name == event.name and event.direction in strip.band.directions
-            ]
-            near = ((band, passage) for band in bands for passage in passed[band, event.id])
-            spots = [
-                (abs(p.time - event.time), band, p.position, _moment_name(band, p))
-                for band, p in near
-            ]
-            spots += [(_SAME, band, 0.5, "") for band in bands]  # if there is no passage
-            _, band, position, moment = min(spots, default=(0.0, None, 0.5, ""))
-            marks.append(EventMark(band, round(position, 3), event, moment))
-        return marks

@@ -146,12 +146,12 @@ class Passages:
 
     Attributes
     ----------
-    by_band
-        The passages of each band, in order.
+    bands, by_band
+        The bands, and the passages of each, in order.
     """
 
     def __init__(self, bands: Sequence[Band]) -> None:
-        self._bands = bands
+        self.bands = bands
         self._latest: dict[int, deque[tuple[FrameTracks, Track]]] = {}
         self.by_band: list[list[BandPassage]] = [[] for _ in bands]
 
@@ -171,7 +171,7 @@ class Passages:
         """Add the passages between the last two of the latest frames with a track."""
         (first, start), (before, previous), (now, track) = latest[0], latest[-2], latest[-1]
         step, frames = (previous.foot, track.foot), now.index - first.index
-        for band, passages in zip(self._bands, self.by_band, strict=True):
+        for band, passages in zip(self.bands, self.by_band, strict=True):
             way = meeting(step, (band.start, band.end))
             if way is not None:
                 position = meeting((band.start, band.end), step) or 0.0
