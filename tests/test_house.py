@@ -21,7 +21,7 @@ ROOMS = (
     "__main__", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "run",
     "review", "pages", "conditions", "traffic", "labels", "lanes", "track", "detect", "synthetic",
     "draw", "regions", "media", "config", "plugins", "workers", "files", "polygons", "boxes",
-    "findings", "errors", "progress", "__init__", "version",
+    "findings", "errors", "__init__", "version",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 

@@ -77,7 +77,7 @@ def test_what_ended_processes_left_is_removed_without_a_word(tmp_path: Path) -> 
             assert len(list(call_all(abs, [1, 2], LocalProcesses(2)))) == 2
             resource_tracker.register({str(tmp_path / "left")!r}, "file")
             return 0
-        vdet.cli.command = work_in_processes
+        vdet.cli.main = work_in_processes
         main()
     """
     result = subprocess.run(

@@ -40,7 +40,6 @@ from vdet.files import OutputFiles, valid_text
 from vdet.labels.label import Format, SavedTracks, SourceVideo
 from vdet.media import Picture
 from vdet.media.images import read_image
-from vdet.progress import no_progress, reporting
 from vdet.review.corrections import Corrections, apply_corrections
 from vdet.run.images import ImageJob, ImageSearch, input_files, run_images
 from vdet.run.loop import Parts
@@ -52,6 +51,7 @@ from vdet.track.track import FrameTracks, Track, VideoTracker, make_tracker
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord
+from vdet.workers import no_progress, reporting
 
 __all__ = (
     "BaseSink", "BatchTotal", "Box", "Boxes", "Counts", "Detector", "DetectorKind",

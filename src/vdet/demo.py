@@ -18,11 +18,11 @@ from vdet.labels.reading import read_tracks, read_truth
 from vdet.learn.svm.mining import MiningLimits, VideoSource, mine
 from vdet.learn.svm.patches import find_patches
 from vdet.learn.svm.training import train
-from vdet.progress import Progress
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 from vdet.synthetic import Scene, busy_road, demo_scene, pole_scene, write_clip, write_truth
 from vdet.traffic.counting import count_files
+from vdet.workers import Progress
 
 ROADS = 6
 """Number of synthetic roads to train the linear model on."""

@@ -1,4 +1,4 @@
-"""Work in parallel: in threads, and in processes of this machine or of a Dask cluster.
+"""Work in parallel, in threads, and in processes of this machine or of a Dask cluster; progress.
 
 Threads read, search and write: items keep their order, and one error ends all. Each kind of them is
 a context manager. When its block ends, its threads have ended, with one exception: a thread that
@@ -7,6 +7,7 @@ hangs in a read or write (for example on a network disk that is gone) is abandon
 """
 
 import contextlib
+import itertools
 import logging
 import math
 import os
@@ -27,6 +28,13 @@ from vdet.errors import INTERRUPTED, ClusterError, needing
 T = TypeVar("T")
 R = TypeVar("R")
 S = TypeVar("S")
+
+Advance = Callable[[int], object]
+"""Called with the number of items done since the last call."""
+Progress = Callable[[str, int | None], Advance]
+"""Called at the start of each stage of the work: its name, empty if there is only one, and the
+expected number of items, None if it is unknown.
+"""
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
@@ -322,3 +330,18 @@ def write_async(
             thread.submit(within.__exit__, *sys.exc_info())
             raise
         thread.submit(within.__exit__, None, None, None).result()
+
+
+def no_progress(_: str, __: int | None) -> Advance:
+    """Show no progress."""
+    return lambda _: None
+
+
+def reporting(report: Callable[[int, int | None], object]) -> Progress:
+    """Return a `Progress` that calls a function with the number of items done and the total."""
+
+    def begin(_: str, total: int | None) -> Advance:
+        done = itertools.count(1)
+        return lambda count: [report(next(done), total) for _ in range(count)]
+
+    return begin

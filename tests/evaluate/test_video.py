@@ -12,8 +12,8 @@ from vdet.detect.detectors import load_detector
 from vdet.errors import TruthError
 from vdet.evaluate.results import ClipResult, evaluate_video
 from vdet.labels.reading import read_truth
-from vdet.progress import Progress, no_progress
 from vdet.synthetic import Scene, write_truth
+from vdet.workers import Progress, no_progress
 
 FRAMES = 10
 Evaluate = Callable[..., ClipResult]

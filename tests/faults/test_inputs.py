@@ -17,10 +17,10 @@ from running import frames_of, names, until, write_drive
 from vdet.batch import process_file
 from vdet.errors import VdetError
 from vdet.labels.reading import read_labelled_images
-from vdet.progress import Progress
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
+from vdet.workers import Progress
 
 COUNT = 60
 

@@ -16,7 +16,6 @@ from vdet.findings import Findings
 from vdet.lanes.road import Road
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
-from vdet.progress import Progress, no_progress
 from vdet.run.loop import Parts, build, peek
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
@@ -25,6 +24,7 @@ from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock
 from vdet.traffic.counter import LiveTraffic
+from vdet.workers import Progress, no_progress
 
 COUNT = 60
 """Frames of the fixture `red_clip`."""

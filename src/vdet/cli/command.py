@@ -19,8 +19,8 @@ import click
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, escaped, in_one_line
 from vdet.files import output_errors
 from vdet.plugins import COMMANDS, built_in_names, load_plugin, plugin_names
-from vdet.progress import Advance, Progress, no_progress
 from vdet.version import __version__
+from vdet.workers import Advance, Progress, no_progress
 
 if TYPE_CHECKING:
     from tqdm import tqdm

@@ -42,14 +42,13 @@ from vdet.labels.label import SavedTracks
 from vdet.labels.reading import Roles, read_tracks, read_truth
 from vdet.media.reader import VideoReader
 from vdet.pages.render import render
-from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
 from vdet.run.images import ImageSearch
 from vdet.run.loop import Parts
 from vdet.run.video import Results, Run
 from vdet.track.track import Track
 from vdet.version import __version__
-from vdet.workers import SearchThreads
+from vdet.workers import Progress, SearchThreads, no_progress
 
 _MAX_DETECTIONS = 1000  # in an image, those of the highest scores
 

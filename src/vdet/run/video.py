@@ -24,7 +24,6 @@ from vdet.findings import Finding, Findings, at_places, warnings_in, without
 from vdet.media import Frame, VideoInfo
 from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
-from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
 from vdet.run.images import input_files
 from vdet.run.loop import Parts, build, named_errors, peek, with_later_classes
@@ -36,7 +35,7 @@ from vdet.traffic.clock import Clock, check_intervals, find_clock
 from vdet.traffic.counter import LiveTraffic, source_video
 from vdet.traffic.counts import Corrected, Counts
 from vdet.traffic.records import VehicleRecord
-from vdet.workers import core_count, read_async
+from vdet.workers import Progress, core_count, no_progress, read_async
 
 if TYPE_CHECKING:
     from vdet.labels.label import SourceVideo
@@ -477,9 +476,7 @@ def _with_saved_tracks(
     run: Run, tracks: Path, progress: Progress
 ) -> tuple[list[Image], SceneTracks]:
     """Return some of the first images, and all saved tracks."""
-    with VideoReader(
-        run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
-    ) as reader:
+    with _opened(replace(run, frames=_STILL_FRAMES)) as reader:
         size = reader.info.width, reader.info.height
         saved = saved_tracks(tracks, run, size, reader.info)
         progress("reading the scene", None)

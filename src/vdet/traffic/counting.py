@@ -25,13 +25,13 @@ from vdet.findings import Finding, at_places, with_counted, without
 from vdet.labels.label import SavedTracks, SourceVideo
 from vdet.labels.reading import read_head, read_tracks
 from vdet.lanes.camera import ground_of
-from vdet.progress import Advance
 from vdet.regions import Regions
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import SEAM, Clock, Span, find_clock
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts
 from vdet.traffic.speeds import SpeedMeter, with_speeds
+from vdet.workers import Advance
 
 _MOVED = 0.2
 """Minimum distance that a vehicle moves to be compared, in heights of its box."""

@@ -30,9 +30,9 @@ from vdet.labels.reading import Roles, read_truth
 from vdet.learn.svm.patches import Sides, patch_archive
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
-from vdet.progress import Progress, no_progress
 from vdet.run.loop import named_errors, peek
 from vdet.track.track import Track
+from vdet.workers import Progress, no_progress
 
 PatchKind = Literal["vehicle", "box", "false alarm", "part"]
 """`vehicle`: the window fits a vehicle. `box`: it shows one off its centre or of another size.

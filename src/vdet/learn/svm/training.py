@@ -28,8 +28,8 @@ from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.errors import DataError
 from vdet.evaluate.results import figure, table
 from vdet.learn.svm.patches import LabelledVectors, PatchFile, extract, hold_out
-from vdet.progress import Progress, no_progress
 from vdet.version import __version__
+from vdet.workers import Progress, no_progress
 
 log = logging.getLogger("vdet")
 

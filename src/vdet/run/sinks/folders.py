@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from vdet.boxes import Image
@@ -39,6 +40,11 @@ _CLIP_NAME = re.compile(
     r"clip-(\d{2,}|\d{4}-\d\d-\d\dT\d\d)-\d\d-\d\d-[\w-]+-\d+(\+\d+)?\.(mp4|mov|mkv)"
 )
 _PRECISION = 1_000_000  # largest denominator of a time, seconds
+
+
+def _is_named(pattern: re.Pattern[str], path: Path) -> bool:
+    """Return whether the name of a file is one that vdet gives."""
+    return pattern.fullmatch(path.name) is not None
 
 
 @sink_function
@@ -106,7 +112,7 @@ def write_crops(path: Path, context: SinkContext) -> Writing:
     At the end, the images of recorded vehicles get their names.
     """
     _, traffic = context.of_video
-    folder = context.files.stage_folder(path, _is_crop)
+    folder = context.files.stage_folder(path, partial(_is_named, _CROP_NAME))
     written: dict[int, tuple[float, Path]] = {}
 
     def write(crops: Iterable[Crop]) -> None:
@@ -126,10 +132,6 @@ def write_crops(path: Path, context: SinkContext) -> Writing:
         file.unlink()
 
 
-def _is_crop(path: Path) -> bool:
-    return _CROP_NAME.fullmatch(path.name) is not None
-
-
 def _crop_name(vehicle: VehicleRecord, time: float) -> str:
     kind = in_file_name(vehicle.class_name)
     parts = ["vehicle", f"{vehicle.id:04d}", *([] if kind == UNKNOWN else [kind])]
@@ -145,7 +147,7 @@ CROPS = SinkKind(
 def write_page(path: Path, context: SinkContext) -> Writing:
     """Collect what the page shows, and write it at the end."""
     video, traffic = context.of_video
-    folder = context.files.stage_folder(path, _is_picture)
+    folder = context.files.stage_folder(path, partial(_is_named, _PICTURE_NAME))
     pictures, spans, frames = dict[int, Path](), list[Span](), 0
 
     def keep(crops: Iterable[Crop]) -> None:
@@ -197,10 +199,6 @@ def _player(path: Path, context: SinkContext, spans: Sequence[Span]) -> Player |
     if not (is_file and plays_in_some_browser(video.path)):
         return None
     return Player(video.path.name, link_to(video.path, path), False, 0.0)
-
-
-def _is_picture(path: Path) -> bool:
-    return _PICTURE_NAME.fullmatch(path.name) is not None
 
 
 def _index(path: Path, context: SinkContext, name: str) -> str:
@@ -306,11 +304,11 @@ def _cut(
 
 def is_clip(path: Path) -> bool:
     """Return whether a file is a clip that vdet wrote."""
-    return _CLIP_NAME.fullmatch(path.name) is not None and is_marked(path)
+    return _is_named(_CLIP_NAME, path) and is_marked(path)
 
 
 def _may_replace(path: Path) -> bool:
-    return is_clip(path) or _CLIP_NAME.fullmatch(path.name) is None
+    return is_clip(path) or not _is_named(_CLIP_NAME, path)
 
 
 def _state(path: Path) -> tuple[int, int, int, int] | None:
@@ -323,7 +321,11 @@ def _state(path: Path) -> tuple[int, int, int, int] | None:
 
 
 CLIPS = SinkKind(
-    write_clips, what="clips", folder_pattern="clip-*.*", takes="videos", may_replace=_may_replace
+    write_clips,
+    what="clips",
+    folder_pattern="clip-*.*",
+    takes="videos",
+    may_replace=_may_replace,
 )
 
 
