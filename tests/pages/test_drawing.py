@@ -20,7 +20,7 @@ from vdet.config.loading import given_values, load_settings, parse_document
 from vdet.config.schema import Settings
 from vdet.findings import Finding
 from vdet.lanes.camera import Undistorter, fit_ground, ground_of
-from vdet.pages.drawing import Drawing
+from vdet.pages.traffic import Drawing
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counting import count_frames

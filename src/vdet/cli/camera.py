@@ -91,7 +91,7 @@ def draw(
       vdet draw in.mp4 -c gate.yaml -o scene.jpg
     """
     from vdet.config.loading import given_values
-    from vdet.pages.drawing import Drawing
+    from vdet.pages.traffic import Drawing
     from vdet.run.video import Run, read_scene
 
     settings = source.load()
