@@ -23,7 +23,6 @@ from vdet.pages.render import (
     Axis,
     Bar,
     Plot,
-    ToClock,
     hex_color,
     interval_plot,
     jpeg_uri,
@@ -200,7 +199,7 @@ class VideoPage:
     def html(self) -> str:
         """Return the page; it loads only the video."""
         shown = longest(self.records)
-        x = time_axis(self.start, self.end, self.to_clock)
+        x = time_axis(self.spans[0][0], self.end, self.clock.at if self.clock else None)
         settings = self.settings.with_paths(lambda path: Path(path).name)
         return render(
             "video.html",
@@ -226,11 +225,6 @@ class VideoPage:
         return [(end, start) for (_, end), (start, _) in pairwise(self.spans)]
 
     @property
-    def start(self) -> float:
-        """Start of the first frame, seconds."""
-        return self.spans[0][0]
-
-    @property
     def end(self) -> float:
         """End of the last frame, seconds."""
         return self.spans[-1][1] + float(1 / self.video.rate)
@@ -238,12 +232,7 @@ class VideoPage:
     @property
     def seconds(self) -> float:
         """The duration of the processed part of the video."""
-        return self.end - self.start
-
-    @property
-    def to_clock(self) -> ToClock:
-        """Converts seconds in the video to clock times; None if these are unknown."""
-        return self.clock.at if self.clock else None
+        return self.end - self.spans[0][0]
 
     def _figures(self) -> list[tuple[str, str]]:
         """Return the key figures."""
@@ -266,7 +255,8 @@ class VideoPage:
 
         There are none if there is only one interval.
         """
-        length, to_clock = self.settings.traffic.seconds or _INTERVAL, self.to_clock
+        length = self.settings.traffic.seconds or _INTERVAL
+        to_clock = self.clock.at if self.clock else None
         intervals = Intervals([(self.clock, self.spans)], length)
         if len(intervals.periods) == 1:
             return []
