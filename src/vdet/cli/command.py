@@ -8,7 +8,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -120,15 +120,15 @@ def progress_bars(unit: str) -> Iterator[Progress]:
         yield start
 
 
-class Command(click.Command):
-    """A command of the program, with `-q` and `-v`."""
+def command() -> Callable[[Callable[..., Any]], click.Command]:
+    """Return a decorator that makes a command of the program, with `-q` and `-v`."""
 
-    def __init__(self, *names: Any, **attributes: Any) -> None:
-        super().__init__(*names, **attributes)
-        self.params += verbosity_options()
+    def decorate(function: Callable[..., Any]) -> click.Command:
+        made = click.command()(function)
+        made.params += verbosity_options()
+        return made
 
-
-command = partial(click.command, cls=Command)
+    return decorate
 
 
 class Program(click.Group):
