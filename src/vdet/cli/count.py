@@ -42,7 +42,13 @@ if TYPE_CHECKING:
     show_default="from TRACKS",
     help="Frame rate of the video, for TRACKS without times.",
 )
-@options.class_option()
+@click.option(
+    "--class",
+    "classes",
+    metavar="NAME",
+    multiple=True,
+    help=f"{options.CLASS_HELP} (`classes`).",
+)
 @options.strict_option
 @options.settings_options
 @options.overwrite_option

@@ -133,13 +133,13 @@ def _print_vehicles(result: "FrameResult") -> None:
     "--margin",
     type=float,
     metavar="SECONDS",
-    help="Time added around each clip (`clips.margin`).",
+    help="Time added around each clip",
 )
 @options.setting_option(
     "clips.exact",
     "--exact",
     is_flag=True,
-    help="Cut clips at exact frames, by encoding again (`clips.exact`).",
+    help="Cut clips at exact frames, by encoding again",
 )
 @options.counts_option
 @options.flows_option
@@ -160,7 +160,7 @@ def _print_vehicles(result: "FrameResult") -> None:
     "--stride",
     type=click.IntRange(1, 100),
     metavar="N",
-    help="Search every N-th frame (`detector.stride`).",
+    help="Search every N-th frame",
 )
 @options.begin_option
 @options.strict_option

@@ -62,8 +62,8 @@ def _parse_sink(text: str) -> Output:
     return Output(name, Path(path))
 
 
-def _changing(key: str) -> dict[str, Any]:
-    """Return the attributes of an option that changes a setting: see `settings_options`."""
+def setting_option(key: str, *names: str, **attributes: Any) -> Callable[[Function], Function]:
+    """Return an option that changes the setting `key`, of commands with `settings_options`."""
 
     def keep(context: click.Context, option: click.Parameter, value: Any) -> None:
         if value is not None and value is not False and value != ():
@@ -73,12 +73,8 @@ def _changing(key: str) -> dict[str, Any]:
             changes = context.meta.setdefault(_CHANGES, [])
             changes.append(given(tuple(key.split(".")), plain, option.opts[0]))
 
-    return {"expose_value": False, "callback": keep}
-
-
-def setting_option(key: str, *names: str, **attributes: Any) -> Callable[[Function], Function]:
-    """Return an option that changes the setting `key`, of commands with `settings_options`."""
-    return click.option(*names, **_changing(key), **attributes)
+    attributes["help"] += f" (`{key}`)."
+    return click.option(*names, expose_value=False, callback=keep, **attributes)
 
 
 input_file = partial(click.option, type=PATH, metavar="FILE")
@@ -104,13 +100,13 @@ interval_option = setting_option(
     "traffic.interval",
     "--interval",
     metavar="TIME",
-    help="Interval of tables and charts, such as 5min, 15min or 1h (`traffic.interval`).",
+    help="Interval of tables and charts, such as 5min, 15min or 1h",
 )
 begin_option = setting_option(
     "input.begin",
     "--begin",
     metavar="TIME",
-    help="Start time of the video, such as '2026-05-01 07:00+02:00' (`input.begin`).",
+    help="Start time of the video, such as '2026-05-01 07:00+02:00'",
 )
 corrections_option = input_file(
     "--corrections",
@@ -131,15 +127,10 @@ tracks_from_option = partial(
     "tracks",
     help="Read the tracks from FILE instead of detecting vehicles.",
 )
-class_option = partial(
-    click.option,
-    "--class",
-    "classes",
-    metavar="NAME",
-    multiple=True,
-    help="Keep only vehicles of this class, such as truck. Can be repeated (`classes`).",
+CLASS_HELP = "Keep only vehicles of this class, such as truck. Can be repeated"
+classes_option = setting_option(
+    "classes", "--class", metavar="NAME", multiple=True, help=CLASS_HELP
 )
-classes_option = class_option(**_changing("classes"))
 strict_option = click.option(
     "--strict", is_flag=True, help="Exit with code 4 if a result is doubtful."
 )
@@ -159,32 +150,15 @@ until_option = number_option(
     help="Stop after this frame, counted from 1.",
 )
 lanes_option = setting_option(
-    "lanes.enabled", "--lanes", is_flag=True, help="Find and draw the lane (`lanes.enabled`)."
+    "lanes.enabled", "--lanes", is_flag=True, help="Find and draw the lane"
 )
 model_option = setting_option(
     "detector.model",
     "--model",
     type=PATH,
     metavar="FILE",
-    help="Detector model: .npz or .onnx. It determines the detector (`detector.model`).",
+    help="Detector model: .npz or .onnx. It determines the detector",
 )
-_configs_option = click.option(
-    "-c",
-    "--config",
-    "configs",
-    metavar="FILE",
-    multiple=True,
-    help="Read settings from a YAML file, or from a shipped one: default, svm, seed, "
-    "ahead or project-camera. Can be repeated. Later files win.",
-)
-_assignments_option = click.option(
-    "--set",
-    "assignments",
-    metavar="KEY=VALUE",
-    multiple=True,
-    help="Change one setting, for example output.crf=18. Can be repeated.",
-)
-
 
 _OF_SEARCHES = "detector", "tracker", "steps", "lanes", "train", "labels", "clips", "draw"
 """Sections of settings that only runs use."""
@@ -249,8 +223,22 @@ class SettingsSource:
 def settings_options(command: Function) -> Function:
     """Add `-c FILE` and `--set KEY=VALUE`; the command receives all settings as `source`."""
 
-    @_configs_option
-    @_assignments_option
+    @click.option(
+        "-c",
+        "--config",
+        "configs",
+        metavar="FILE",
+        multiple=True,
+        help="Read settings from a YAML file, or from a shipped one: default, svm, seed, "
+        "ahead or project-camera. Can be repeated. Later files win.",
+    )
+    @click.option(
+        "--set",
+        "assignments",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="Change one setting, for example output.crf=18. Can be repeated.",
+    )
     @wraps(command)
     def with_source(configs: tuple[str, ...], assignments: tuple[str, ...], **values: Any) -> Any:
         changes = click.get_current_context().meta.get(_CHANGES, ())
