@@ -37,7 +37,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
     DETECTORS: {"net": "vdet.config.kinds:NET", "svm": "vdet.config.kinds:SVM"},
     TRACKERS: {"motion": "vdet.config.kinds:MOTION", "rules": "vdet.config.kinds:RULES"},
     SINKS: {
-        name: f"vdet.run.sinks.{module}:{name.upper()}"
+        name: f"vdet.run.sinks.{module}:{name}"
         for module, names in {
             "drawn": ("video", "image"),
             "data": ("tracks", "json", "labels", "vehicles", "counts", "flows", "conditions"),

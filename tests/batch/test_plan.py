@@ -215,8 +215,8 @@ class TestTotals:
     @pytest.fixture(autouse=True)
     def all_tracks(self, monkeypatch: pytest.MonkeyPatch) -> None:
         total = BatchTotal("all", lambda _, target: target.touch())
-        kind = replace(data.TRACKS, total=total)
-        monkeypatch.setattr(data, "TRACKS", kind)
+        kind = replace(data.tracks, total=total)
+        monkeypatch.setattr(data, "tracks", kind)
 
     def test_it_is_kept_like_other_outputs(self) -> None:
         Path("out").mkdir()

@@ -326,7 +326,7 @@ def test_a_total_that_cannot_be_made_leaves_nothing(
         raise OSError(28, "No space left on device")
 
     def replaced(**changes: Any) -> None:
-        monkeypatch.setattr(data, "VEHICLES", replace(data.VEHICLES, **changes))
+        monkeypatch.setattr(data, "vehicles", replace(data.vehicles, **changes))
 
     replaced(total=BatchTotal("all", fail))
     with pytest.raises(OutputError, match=r"all.cars.json: .*No space left"):

@@ -4,10 +4,8 @@ Times are in seconds of the input. Pixels are those of the input frame, counted 
 """
 
 import sys
-from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,23 +15,10 @@ from vdet.files import OutputFiles, json_text, print_now, valid_text, write_text
 from vdet.findings import AT_LINES, without
 from vdet.labels.coco import COCO, write_coco_images
 from vdet.labels.images import LabelledImage
-from vdet.labels.label import (
-    SourceVideo,
-    TrackWriter,
-    check_track_name,
-    format_for,
-    track_suffixes,
-)
+from vdet.labels.label import SourceVideo, TrackWriter, check_track_name, format_for, track_suffixes
 from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.pages.traffic import scene_picture, survey_image
-from vdet.run.sinks.protocol import (
-    STANDARD_OUTPUT,
-    BatchTotal,
-    SinkContext,
-    SinkKind,
-    Writing,
-    sink_function,
-)
+from vdet.run.sinks.protocol import STANDARD_OUTPUT, BatchTotal, SinkContext, Writing, sink
 from vdet.run.steps import findings_in
 from vdet.traffic import output
 from vdet.traffic.counter import source_video
@@ -43,8 +28,15 @@ from vdet.traffic.survey import Survey
 from vdet.version import __version__
 
 
-@sink_function
-def write_tracks(path: Path, context: SinkContext) -> Writing:
+@sink(
+    suffixes=track_suffixes,
+    what="tracks",
+    writes_standard_output=True,
+    takes="videos",
+    uses_traffic=False,
+    check=check_track_name,
+)
+def tracks(path: Path, context: SinkContext) -> Writing:
     """Write the tracks of each frame; the ending of the name selects the format.
 
     The formats are those of `vdet.labels.label`. The path `-` stands for standard output, as
@@ -93,19 +85,8 @@ def _source(context: SinkContext) -> SourceVideo:
     )
 
 
-TRACKS = SinkKind(
-    write_tracks,
-    track_suffixes,
-    "tracks",
-    writes_standard_output=True,
-    takes="videos",
-    uses_traffic=False,
-    check=check_track_name,
-)
-
-
-@sink_function
-def write_labels(path: Path, context: SinkContext) -> Writing:
+@sink(suffixes=(COCO.suffix,), what="labels of images", takes="images")
+def labels(path: Path, context: SinkContext) -> Writing:
     """Collect the boxes of images, and write them at the end as COCO, for label tools.
 
     An image is named by its path below the input folder.
@@ -119,11 +100,8 @@ def write_labels(path: Path, context: SinkContext) -> Writing:
         write_coco_images(file, images)
 
 
-LABELS = SinkKind(write_labels, (COCO.suffix,), "labels of images", takes="images")
-
-
-@sink_function
-def write_json(path: Path, context: SinkContext) -> Writing:
+@sink(what="lists of boxes", writes_standard_output=True, takes="images")
+def json(path: Path, context: SinkContext) -> Writing:
     """Collect an item per image, and write the list at the end, if it is not empty.
 
     Each item has `image`, `width`, `height` and `boxes`: the tracks of the image as in `.jsonl`,
@@ -146,46 +124,29 @@ def write_json(path: Path, context: SinkContext) -> Writing:
         write_text(context.files.stage(path), json_text(items))
 
 
-JSON = SinkKind(write_json, what="lists of boxes", writes_standard_output=True, takes="images")
-
-
-def _write_table(
-    make: Callable[[Path, SinkContext], Any], path: Path, context: SinkContext
-) -> Writing:
-    """Write a table or JSON at the end, and return it for the file over all videos."""
+@sink(suffixes=(".json",), what="findings", takes="videos", uses_traffic=False)
+def conditions(path: Path, context: SinkContext) -> Writing:
+    """Write the reasons to doubt the results of the video: a list of findings."""
     while (yield):
         pass
-    content = make(path, context)
-    write_content(context.files.stage(path), content)
-    return content
+    write_content(context.files.stage(path), findings_in(context.facts).record())
 
 
-def _records(path: Path, context: SinkContext) -> Any:
-    """Return a record of each vehicle, for `.csv`, `.json` or `.parquet`."""
-    _, traffic = context.of_video
-    return records_content(traffic.vehicles, path, traffic.clock)
-
-
-def _findings(_: Path, context: SinkContext) -> Any:
-    """Return the reasons to doubt the results of the video: a list of findings."""
-    return findings_in(context.facts).record()
-
-
-CONDITIONS = SinkKind(
-    sink_function(partial(_write_table, _findings)),
-    (".json",),
-    "findings",
-    takes="videos",
-    uses_traffic=False,
-)
-VEHICLES = SinkKind(
-    sink_function(partial(_write_table, _records)),
-    SUFFIXES,
-    "records of vehicles",
+@sink(
+    suffixes=SUFFIXES,
+    what="records of vehicles",
     takes="videos",
     check=check_table,
     total=BatchTotal("all", join_records),
 )
+def vehicles(path: Path, context: SinkContext) -> Writing:
+    """Write a record of each vehicle, and return all for the file over all videos."""
+    while (yield):
+        pass
+    _, traffic = context.of_video
+    records = records_content(traffic.vehicles, path, traffic.clock)
+    write_content(context.files.stage(path), records)
+    return records
 
 
 _CONTENTS = {"counts": output.counts_content, "flows": output.flows_content}
@@ -204,7 +165,6 @@ def write_tables(
     return write_content(files.stage(path), content)
 
 
-@sink_function
 def _write_counts(name: str, path: Path, context: SinkContext) -> Writing:
     """Write the counts at lines and in zones, or the flows, at the end.
 
@@ -227,5 +187,13 @@ def _write_counts(name: str, path: Path, context: SinkContext) -> Writing:
     write_tables(survey, name, path, context.files, picture)
 
 
-COUNTS = SinkKind(partial(_write_counts, "counts"), output.COUNT_SUFFIXES, "counts", takes="videos")
-FLOWS = SinkKind(partial(_write_counts, "flows"), output.FLOW_SUFFIXES, "flows", takes="videos")
+@sink(suffixes=output.COUNT_SUFFIXES, what="counts", takes="videos")
+def counts(path: Path, context: SinkContext) -> Writing:
+    """Write the counts at lines and in zones."""
+    return _write_counts("counts", path, context)
+
+
+@sink(suffixes=output.FLOW_SUFFIXES, what="flows", takes="videos")
+def flows(path: Path, context: SinkContext) -> Writing:
+    """Write the flows."""
+    return _write_counts("flows", path, context)

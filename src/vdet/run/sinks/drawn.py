@@ -23,7 +23,7 @@ from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import IMAGE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
-from vdet.run.sinks.protocol import SinkContext, SinkKind, Writing, sink_function
+from vdet.run.sinks.protocol import SinkContext, Writing, sink
 from vdet.run.steps import FrameResult
 from vdet.track.track import Track
 from vdet.workers import core_count, write_async
@@ -119,8 +119,14 @@ def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
     draw_marks(surface, marks)
 
 
-@sink_function
-def write_video(path: Path, context: SinkContext) -> Writing:
+@sink(
+    suffixes=VIDEO_SUFFIXES,
+    what="videos",
+    takes="videos",
+    uses_traffic=False,  # it draws counts only if the settings have lines or zones
+    may_replace=may_replace_video,
+)
+def video(path: Path, context: SinkContext) -> Writing:
     """Draw on copies of the frames, and encode them in a thread."""
     video, traffic = context.of_video
     overlay = Overlay(context.settings, video, traffic.counter)
@@ -145,24 +151,11 @@ def write_video(path: Path, context: SinkContext) -> Writing:
             put(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
-VIDEO = SinkKind(
-    write_video,
-    VIDEO_SUFFIXES,
-    "videos",
-    takes="videos",
-    uses_traffic=False,  # it draws counts only if the settings have lines or zones
-    may_replace=may_replace_video,
-)
-
-
-@sink_function
-def write_image(path: Path, context: SinkContext) -> Writing:
+@sink(suffixes=sorted(IMAGE_SUFFIXES), what="images", takes="images")
+def image(path: Path, context: SinkContext) -> Writing:
     """Draw the vehicles on one image, and write it. Raises `OutputError` for a second one."""
     if result := (yield):
         drawn = Picture(Overlay(context.settings, None).draw(result))
         context.files.stage(path).write_bytes(encode_image(drawn.image, path))
         if (yield):
             raise OutputError(f"{path}: is for one image; for several, use a folder")
-
-
-IMAGE = SinkKind(write_image, sorted(IMAGE_SUFFIXES), "images", takes="images")

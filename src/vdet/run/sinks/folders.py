@@ -23,7 +23,7 @@ from vdet.pages.render import PAGE_NAME, REVIEW_NAME, link_to, thumbnail, webp_u
 from vdet.pages.video import Player, VideoPage, longest, write_index, write_reviews
 from vdet.regions import Regions
 from vdet.run.sinks.drawn import IMAGE_LABELS
-from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind, Writing, sink_function
+from vdet.run.sinks.protocol import BatchTotal, SinkContext, Writing, sink
 from vdet.run.steps import FINDINGS, FrameResult, findings_in
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock, Span, extend
@@ -42,13 +42,17 @@ _CLIP_NAME = re.compile(
 _PRECISION = 1_000_000  # largest denominator of a time, seconds
 
 
+_INDEX = BatchTotal("index", write_index, ".html", of_failed=lambda error: {"error": error})
+_LIST = BatchTotal("reviews", write_reviews, ".html", of_failed=lambda error: {"error": error})
+
+
 def _is_named(pattern: re.Pattern[str], path: Path) -> bool:
     """Return whether the name of a file is one that vdet gives."""
     return pattern.fullmatch(path.name) is not None
 
 
-@sink_function
-def write_stages(path: Path, context: SinkContext) -> Writing:
+@sink(what="stages", folder_pattern=f"*-{_BOXES}.png", uses_traffic=False)
+def stages(path: Path, context: SinkContext) -> Writing:
     """Write stage images of the first searched frame at or after the time `SinkContext.at`.
 
     Raises `OutputError` if there is none.
@@ -102,11 +106,8 @@ def _with_states(result: FrameResult, earlier: Mapping[int, Track]) -> Image:
     return picture
 
 
-STAGES = SinkKind(write_stages, what="stages", folder_pattern=f"*-{_BOXES}.png", uses_traffic=False)
-
-
-@sink_function
-def write_crops(path: Path, context: SinkContext) -> Writing:
+@sink(what="images of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos")
+def crops(path: Path, context: SinkContext) -> Writing:
     """Write the image of a vehicle when it is gone; a better one later replaces it.
 
     At the end, the images of recorded vehicles get their names.
@@ -138,13 +139,8 @@ def _crop_name(vehicle: VehicleRecord, time: float) -> str:
     return f"{'-'.join(parts)}-at-{time:.3f}s.jpg"
 
 
-CROPS = SinkKind(
-    write_crops, what="images of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
-)
-
-
-@sink_function
-def write_page(path: Path, context: SinkContext) -> Writing:
+@sink(what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX, finish_order=1)
+def page(path: Path, context: SinkContext) -> Writing:
     """Collect what the page shows, and write it at the end."""
     video, traffic = context.of_video
     folder = context.files.stage_folder(path, partial(_is_named, _PICTURE_NAME))
@@ -207,12 +203,6 @@ def _index(path: Path, context: SinkContext, name: str) -> str:
     return link_to(index, path) if index else ""
 
 
-_INDEX = BatchTotal("index", write_index, ".html", of_failed=lambda error: {"error": error})
-PAGE = SinkKind(
-    write_page, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX, finish_order=1
-)
-
-
 @dataclass(frozen=True, slots=True)
 class ClipSpan:
     """A time span in which vehicles are shown, with its margins; seconds in the video."""
@@ -244,8 +234,17 @@ def scenes(records: Iterable[VehicleRecord], margin: float) -> list[ClipSpan]:
     return found
 
 
-@sink_function
-def write_clips(path: Path, context: SinkContext) -> Writing:
+def is_clip(path: Path) -> bool:
+    """Return whether a file is a clip that vdet wrote."""
+    return _is_named(_CLIP_NAME, path) and is_marked(path)
+
+
+def _may_replace(path: Path) -> bool:
+    return is_clip(path) or not _is_named(_CLIP_NAME, path)
+
+
+@sink(what="clips", folder_pattern="clip-*.*", takes="videos", may_replace=_may_replace)
+def clips(path: Path, context: SinkContext) -> Writing:
     """Cut the clips at the end of the run; with lines or zones, only of counted vehicles.
 
     The video is read a second time: if it is no longer the same file then, there are no clips. One
@@ -302,15 +301,6 @@ def _cut(
     encode_part(video.path, max(start, Fraction(0)), end, target, settings, name=clip)
 
 
-def is_clip(path: Path) -> bool:
-    """Return whether a file is a clip that vdet wrote."""
-    return _is_named(_CLIP_NAME, path) and is_marked(path)
-
-
-def _may_replace(path: Path) -> bool:
-    return is_clip(path) or not _is_named(_CLIP_NAME, path)
-
-
 def _state(path: Path) -> tuple[int, int, int, int] | None:
     """Return what changes when a file is replaced or written; None if it does not exist."""
     try:
@@ -320,17 +310,8 @@ def _state(path: Path) -> tuple[int, int, int, int] | None:
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
-CLIPS = SinkKind(
-    write_clips,
-    what="clips",
-    folder_pattern="clip-*.*",
-    takes="videos",
-    may_replace=_may_replace,
-)
-
-
-@sink_function
-def write_review(path: Path, context: SinkContext) -> Writing:
+@sink(what="reviews", folder_pattern=REVIEW_NAME, takes="videos", total=_LIST, finish_order=-1)
+def review(path: Path, context: SinkContext) -> Writing:
     """Write the page on which the counts are checked.
 
     At the end, add the traces to the counts, and the findings about them.
@@ -358,14 +339,3 @@ def write_review(path: Path, context: SinkContext) -> Writing:
         facts[FINDINGS] = replace(findings_in(facts), items=counts.findings)
         facts_of_page = recorder.write(file, counted, counts, _index(path, context, "review"))
     return {"page": f"{path.name}/{REVIEW_NAME}", **facts_of_page}
-
-
-_LIST = BatchTotal("reviews", write_reviews, ".html", of_failed=lambda error: {"error": error})
-REVIEW = SinkKind(
-    write_review,
-    what="reviews",
-    folder_pattern=REVIEW_NAME,
-    takes="videos",
-    total=_LIST,
-    finish_order=-1,
-)

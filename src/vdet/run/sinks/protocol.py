@@ -5,9 +5,9 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, wraps
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, Self
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 import cv2
 import numpy as np
@@ -29,12 +29,10 @@ if TYPE_CHECKING:  # an image needs no traffic: a tenth of the time of `detect-i
     from vdet.traffic.records import BestCrops, VehicleRecord
     from vdet.traffic.survey import Survey
 
-P = ParamSpec("P")
-
 STANDARD_OUTPUT = Path("-")
 
 Writing = Generator[None, FrameResult | None, Any]
-"""What a `sink_function` does: it receives results until None, when the run ends without an error.
+"""What the function of a `sink` does: it receives results, and None if a run ends without an error.
 
 It returns the `summary` of the output: see `BaseSink`.
 """
@@ -234,16 +232,6 @@ class _FunctionSink:
         self._writing.send(result)
 
 
-def sink_function(function: Callable[P, Writing]) -> Callable[P, Sink]:
-    """Return what opens the sink that a generator function describes."""
-
-    @wraps(function)
-    def open_sink(*arguments: P.args, **named: P.kwargs) -> Sink:
-        return _FunctionSink(function(*arguments, **named))
-
-    return open_sink
-
-
 @dataclass(frozen=True, slots=True)
 class BatchTotal:
     """A file over all videos of a batch, made from the summaries of the sinks.
@@ -325,6 +313,21 @@ class SinkKind:
             return True
         lengths = [len(ending) for ending in self.endings if name.lower().endswith(ending)]
         return not self.endings or 0 < max(lengths, default=0) < len(name)
+
+
+def sink(**attributes: Any) -> Callable[[Callable[[Path, SinkContext], Writing]], SinkKind]:
+    """Return a decorator for a generator function: the kind of sink that writes as it does.
+
+    `attributes` are those of `SinkKind`.
+    """
+
+    def decorate(function: Callable[[Path, SinkContext], Writing]) -> SinkKind:
+        def open_sink(path: Path, context: SinkContext) -> Sink:
+            return _FunctionSink(function(path, context))
+
+        return SinkKind(open_sink, **attributes)
+
+    return decorate
 
 
 def sink_kind(name: str) -> SinkKind:
