@@ -1,6 +1,5 @@
 """The page on which counts are checked: strips with marks, all in one file."""
 
-import tempfile
 from base64 import b64encode
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -8,7 +7,7 @@ from dataclasses import asdict, astuple, dataclass, field
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Any, Literal, Self, TextIO
+from typing import Any, Literal, TextIO
 from zlib import crc32
 
 import cv2
@@ -23,7 +22,7 @@ from vdet.files import valid_text
 from vdet.media import Picture, VideoInfo
 from vdet.media.frame import Coding
 from vdet.media.images import coarse_scale, shrunk
-from vdet.pages.render import TEMPLATES, render, thumbnail
+from vdet.pages.render import TEMPLATES, render
 from vdet.pages.traffic import scene_picture
 from vdet.review.corrections import MAX_BYTES, Corrections, correct, covers
 from vdet.review.estimate import draw_spans, equal_spans, span_length, strata_of
@@ -41,7 +40,6 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span
 from vdet.traffic.counts import Corrected, Counts, Event, Trace, class_of
 from vdet.traffic.crossings import Border
-from vdet.traffic.records import BestCrops, Crop
 from vdet.version import __version__
 
 _PICTURES = "<!-- pictures -->"
@@ -330,20 +328,21 @@ class _Strip:
 
 
 class ReviewRecorder:
-    """Records the strips of a video while it is read, minute by minute, and the best pictures.
+    """Records the strips of a video while it is read, minute by minute.
 
-    A context manager: its pictures are temporary files until `write`. The page opens `corrections`.
+    Until `write`, all pictures are files in `folder`, also those of vehicles (`crop_name`). The
+    page opens `corrections`.
     """
 
     def __init__(
         self,
+        folder: Path,
         video: VideoInfo,
         settings: Settings,
         borders: Sequence[Border],
-        crops: BestCrops,
         corrections: Corrections | None,
     ) -> None:
-        self._video, self._settings, self._crops = video, settings, crops
+        self._video, self._settings = video, settings
         self._corrections = corrections
         bands = bands_of(borders)
         self._strips = [
@@ -353,20 +352,14 @@ class ReviewRecorder:
         self._tracks: list[FrameTracks] = []
         self._traces: list[Trace] = []
         self._passages = Passages(bands)
-        self._folder = tempfile.TemporaryDirectory()
+        self._folder = folder
         self._pictures: list[StripPicture] = []
         self._undecided: list[tuple[int, BandPassage, Image]] = []  # with the number of the band
         self._minute = 0
         self._coding = Coding(full_range=True)  # of strips of images
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._folder.cleanup()
-
-    def add(self, frame: FrameTracks, selected: FrameTracks, picture: Picture) -> None:
-        """Add a frame, with its tracks, and those of the selected classes."""
+    def add(self, frame: FrameTracks, picture: Picture) -> None:
+        """Add a frame with its tracks of all classes."""
         if not (self._tracks or self._pictures):  # the first frame
             small = self._reduced(picture.image, _SCENE_WIDTH, largest=0)
             self._write("scene-picture", scene_picture(small, self._settings.traffic, ()))
@@ -382,12 +375,10 @@ class ReviewRecorder:
             self._strips[number].add(frame.time, picture, passages)
             for passage in passages[passed[number] :]:
                 self._add_moment(number, passage, picture.image)
-        self._write_crops(self._crops.add(selected, picture))
 
     def end(self) -> tuple[Trace, ...]:
         """End the strips after the last frame, and return what passed without a track."""
         self._end_minute(is_end=True)
-        self._write_crops(self._crops.end())
         return tuple(sorted(self._traces, key=lambda trace: trace.time))
 
     def write(self, path: Path, counted: Counts, counts: Counts, index: str) -> dict[str, Any]:
@@ -405,7 +396,7 @@ class ReviewRecorder:
             reviewed=self._corrections,
         )
         with path.open("w", encoding="utf-8", errors="backslashreplace") as file:
-            review.write(file, Path(self._folder.name), index)
+            review.write(file, self._folder, index)
         return {
             "key": review.key,
             "vehicles": len({event.vehicle for event in counted.events}),
@@ -463,10 +454,6 @@ class ReviewRecorder:
         scale = coarse_scale(widest / band.length * band.samples, band.samples)
         return shrunk(strip, round(scale * band.samples) / band.samples)  # whole pixels a column
 
-    def _write_crops(self, crops: Sequence[Crop]) -> None:
-        for crop in crops:
-            (Path(self._folder.name) / crop_name(crop.id)).write_bytes(thumbnail(crop.image))
-
     def _add_moment(self, number: int, passage: BandPassage, image: Image) -> None:
         """Write the frame in which a vehicle passes a line, if it will be doubtful.
 
@@ -509,4 +496,4 @@ class ReviewRecorder:
 
     def _write(self, name: str, image: Image) -> None:
         _, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
-        (Path(self._folder.name) / name).write_bytes(data.tobytes())
+        (self._folder / name).write_bytes(data.tobytes())

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
@@ -318,18 +319,26 @@ def review(path: Path, context: SinkContext) -> Writing:
     """
     if not context.settings.traffic:
         raise OutputError(f"{path}: no lines or zones to review; add them to the settings")
-    from vdet.review.page import ReviewRecorder  # most runs load nothing of it
+    from vdet.review.page import ReviewRecorder, crop_name  # most runs load nothing of it
     from vdet.review.strips import with_traces
 
     (video, traffic), facts = context.of_video, context.facts
     assert traffic.counter  # the settings have lines or zones
     file, borders = context.files.stage_folder(path) / REVIEW_NAME, traffic.counter.borders
-    with ReviewRecorder(
-        video, context.settings, borders, context.crops, context.corrections
-    ) as recorder:
+    with TemporaryDirectory() as folder:
+        pictures, given = Path(folder), context.corrections
+        recorder = ReviewRecorder(pictures, video, context.settings, borders, given)
+
+        def keep(crops: Iterable[Crop]) -> None:
+            for crop in crops:
+                (pictures / crop_name(crop.id)).write_bytes(thumbnail(crop.image))
+
         while result := (yield):
-            frame = replace(result.frame_tracks, tracks=(*result.tracks, *result.unselected))
-            recorder.add(frame, result.frame_tracks, result.frame.picture)
+            frame, picture = result.frame_tracks, result.frame.picture
+            every = replace(frame, tracks=(*result.tracks, *result.unselected))
+            recorder.add(every, picture)
+            keep(context.crops.add(frame, picture))
+        keep(context.crops.end())
         counts = traffic.counts()
         assert counts
         traffic.revise(with_traces(counts, recorder.end()))
