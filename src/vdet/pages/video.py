@@ -386,17 +386,15 @@ def _plain_seconds(clock: str | None) -> int | None:
     return round(datetime.fromisoformat(clock).replace(tzinfo=UTC).timestamp())
 
 
-def _listed(videos: Summaries) -> list[ListedVideo]:
-    """Return the videos that did not fail."""
-    return [
+def _listing(videos: Summaries) -> dict[str, Any]:
+    """Return the `videos` of a list, and the errors of those that `failed`."""
+    failed = {name: values["error"] for name, values in videos.items() if "error" in values}
+    listed = [
         ListedVideo(name, link_to(Path(name).parent / values["page"], Path()), values)
         for name, values in videos.items()
-        if "error" not in values
+        if name not in failed
     ]
-
-
-def _errors(videos: Summaries) -> dict[str, str]:
-    return {name: values["error"] for name, values in videos.items() if "error" in values}
+    return {"videos": listed, "failed": failed}
 
 
 def write_index(videos: Summaries, target: Path) -> None:
@@ -404,15 +402,12 @@ def write_index(videos: Summaries, target: Path) -> None:
 
     A video that failed has its `error` instead.
     """
-    listed = _listed(videos)
-    counts = sum((Counter(video.facts["counts"]) for video in listed), Counter[str]())
-    table, failed = table_json(listed), _errors(videos)
-    write_text(
-        target, render("index.html", videos=listed, failed=failed, counts=counts, table=table)
-    )
+    listing = _listing(videos)
+    counts = sum((Counter(video.facts["counts"]) for video in listing["videos"]), Counter[str]())
+    table = table_json(listing["videos"])
+    write_text(target, render("index.html", **listing, counts=counts, table=table))
 
 
 def write_reviews(videos: Summaries, target: Path) -> None:
     """Write the list of reviews of many videos, from the summaries of these."""
-    listed = _listed(videos)
-    write_text(target, render("reviews.html", videos=listed, failed=_errors(videos)))
+    write_text(target, render("reviews.html", **_listing(videos)))
