@@ -12,6 +12,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import onnx
 from onnx import numpy_helper
 
@@ -48,15 +49,18 @@ def from_checkpoint(path: Path, output: Path, base: Header | None) -> None:
 
 
 def mix(model: onnx.ModelProto, base: onnx.ModelProto, share: float) -> None:
-    """Average the weights of a network with those of its base, which may lack the last classes.
+    """Average the weights of a network with those of its base.
 
-    `share` is the weight of the first.
+    The base may lack the last classes, and the last channels of each layer: they count as zeros
+    where other channels read them. `share` is the weight of the first.
 
     Source: Wortsman et al., "Robust fine-tuning of zero-shot models", 2022.
     """
     for new, old in zip(_weights(model), _weights(base), strict=True):
         values, before = numpy_helper.to_array(new).copy(), numpy_helper.to_array(old)
-        values[: len(before)] += (1 - share) * (before - values[: len(before)])
+        widened = np.zeros_like(values[: len(before)])
+        widened[tuple(map(slice, before.shape))] = before
+        values[: len(before)] += (1 - share) * (widened - values[: len(before)])
         new.CopyFrom(numpy_helper.from_array(values, new.name))
 
 
