@@ -30,8 +30,11 @@ all votes that it needs. On images that it has not seen, the shipped network is 
 0.93, but takes trucks and buses for cars to a third or a half.
 """
 
-_UNUSUAL_NEED = 0.3
-"""Fraction of all votes that another class needs; without one, the class is `UNKNOWN`."""
+_UNUSUAL_NEED, _BESIDE_USUAL = 0.3, 2 / 3
+"""Fractions of all votes, and of those of the usual class, that another class needs; without one,
+the class is `UNKNOWN`. If all classes needed 2/3 of all votes, one lorry of three real clips would
+not be called a bus, and three would no longer be called trucks.
+"""
 
 _CLOSE = 0.05
 """Fraction of the frame's area above which a larger box does not help to tell classes apart."""
@@ -209,10 +212,12 @@ class ClassVotes:
         if not self._sums:
             return None
         total, unusual = sum(self._sums.values()), dict(self._sums)
-        if unusual.pop(_USUAL, 0.0) >= _USUAL_NEEDS * total or not unusual:
+        usual = unusual.pop(_USUAL, 0.0)
+        if usual >= _USUAL_NEEDS * total or not unusual:
             return _USUAL
         name = max(unusual, key=unusual.__getitem__)
-        return name if unusual[name] >= _UNUSUAL_NEED * total else UNKNOWN
+        needed = max(_UNUSUAL_NEED * total, _BESIDE_USUAL * usual)
+        return name if unusual[name] >= needed else UNKNOWN
 
     def add(self, classes: Mapping[str, float], weight: float) -> None:
         """Add the votes of a search: the probability of each class, times the weight."""

@@ -14,7 +14,7 @@ from vdet.media import Picture
 from vdet.synthetic import Renderer, demo_scene, must_be_found, true_boxes
 from vdet.testing import check_detector
 
-MAX_BYTES = 2_500_000
+MAX_BYTES = 4_000_000
 FRAME = 40
 SIZES = [(1280, 720), (640, 480), (1242, 375), (270, 480), (64, 64)]
 
