@@ -138,7 +138,7 @@ def loaded_by(code: str) -> set[str]:
 def modules_of(code: str) -> set[str]:
     """Return the names of all modules that a start of the program imports."""
     text = (
-        "import sys, vdet.__main__; from vdet.cli import main\n"
+        "import sys, vdet.__main__; from vdet import cli; main = cli.main\n"
         f"{code}\n"
         "print('\\nloaded', *sys.modules)"
     )

@@ -32,6 +32,7 @@ _DEPRECATED = {
 
 def __getattr__(name: str) -> object:
     from importlib import import_module
+    from importlib.util import find_spec
 
     if module := _DEPRECATED.get(name):
         from warnings import warn
@@ -39,7 +40,8 @@ def __getattr__(name: str) -> object:
         text = f"vdet.{name} will be removed in vdet 2.0; use {module}.{name}"
         warn(text, DeprecationWarning, stacklevel=2)
         return getattr(import_module(module), name)
-    if name == "__all__" or not name.startswith("__"):
+    # A module is imported after this, as in `from vdet import cli`, without the API.
+    if name == "__all__" or not (name.startswith("__") or find_spec(f"vdet.{name}")):
         api = import_module("vdet.api")
         if name == "__all__" or name in api.__all__:
             return getattr(api, name)
