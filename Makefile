@@ -7,10 +7,11 @@ TOOLS := $(VENV)/.tools
 DATA ?= $(or $(VDET_DATA),data)
 ROADS ?= $(DATA)/roads
 TRUTH ?= $(DATA)/project_video_0001-0880.txt
-SHARES := {"traffic_cams":3, "overpass":2.2, "bdd100k_dashcam":2.5, "vietnam_street":1.5, \
-	"bangladesh_roads":1.5, "manaus_misc":1.5, "dawn_fog":1.3, "topview_roads":1.2, "toll_km39":1.2, \
-	"lake_county_cctv":1.2, "bdd_rain":1.5, "bdd_night":1.5, "bdd_trucks_day":1.8, \
-	"vehicle_photos":1.3, "delhi_junctions":1.3, "gandhinagar_junctions":1.3, "mauritius_cctv":1.2}
+SHARES := {"traffic_cams":3.5, "overpass":2.8, "topview_roads":2, "toll_km39":2, "lake_county_cctv":1.7, \
+	"mauritius_cctv":1.8, "delhi_junctions":1.6, "gandhinagar_junctions":1.6, "manaus_misc":1.5, \
+	"vietnam_street":1.5, "iran_footbridges":1.5, "boston_roof":1.2, "bdd100k_dashcam":2.2, \
+	"bdd_trucks_day":2.2, "bdd_rain":1.5, "bdd_night":1.5, "vehicle_photos":1.5, "bangladesh_roads":1.4, \
+	"kathmandu_tripureshwor":1.3, "dawn_fog":1.2}
 WEIGHTS ?= build/net/net.onnx
 FOLDS ?= 6
 STEPS ?= 4000
@@ -78,7 +79,7 @@ net: $(TOOLS)  ## continue training the shipped network (hours): sets of images 
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
 		--video $(DATA)/project_video.mp4 $(TRUTH) --base src/vdet/models/net.onnx \
-		--set train.net.steps=5500 --set train.net.learning_rate=0.0005 \
+		--set train.net.steps=15000 \
 		--set 'train.net.classes=[car, truck, bus, motorcycle, bicycle, person, other vehicle]' \
 		--set 'train.net.weights=$(SHARES)'
 
