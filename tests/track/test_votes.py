@@ -109,7 +109,8 @@ def test_a_box_cut_off_by_the_frame_hardly_counts() -> None:
         ([{"car": 0.65, "truck": 0.35}], "car"),
         ([{"truck": 0.45, "bus": 0.55}], "bus"),
     ],
-    ids=["the sure search decides", "trucks look like cars", "not clear", "rather a car", "car", "no car"],
+    ids=["the sure search decides", "trucks look like cars", "not clear", "rather a car", "car",
+         "no car"],
 )  # fmt: skip
 def test_searches_vote_with_the_likelihood_of_each_class(
     likely: list[dict[str, float]], name: str
