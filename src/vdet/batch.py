@@ -474,8 +474,9 @@ def _reject_unreadable(error: OSError) -> None:
 class Plan:
     """The runs to process and those to skip; all their outputs are in `folder`.
 
-    `common` is what they have in common; its outputs are the endings of theirs. `doubtful` of those
-    to skip may have wrong results, by their records.
+    `common` has the settings of all runs; the paths of its outputs are endings, and their `total`
+    are the files over all videos. `doubtful` is the number of skipped runs that may have wrong
+    results, by their records.
     """
 
     folder: Path

@@ -6,7 +6,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """An output of a run: the name of its sink, its path, and the file over its batch, if any."""
+    """An output of a run: its sink, its path, and in a batch the file over all videos, if any."""
 
     sink: str
     path: Path
