@@ -91,3 +91,14 @@ def test_what_hides_the_view_does_not_move_the_camera(end: float, is_clear: bool
         plane = hidden if is_hidden else view(0, 0, 0)
         watch.add(time, plane, [], is_clear=is_clear or not is_hidden)
     assert codes(watch) == []
+
+
+def test_heavy_rain_does_not_move_the_camera() -> None:
+    watch, rng = CameraWatch(), np.random.default_rng(2)
+    for time in np.arange(0, 20, 0.25).tolist():
+        plane = view(0, 0, 0) // 2
+        for x, y in rng.integers((0, 0), (WIDTH, HEIGHT - 8), (300, 2)):
+            plane[y : y + 8, x] += 60
+        watch.add(time, plane, [], is_clear=True)
+    assert watch.is_still
+    assert codes(watch) == []

@@ -49,8 +49,9 @@ def test_a_vehicle_that_was_not_found_is_said_with_its_time_and_its_line() -> No
     [
         (lambda time: Box.sized(12 * time, 30, 6, 20), 0.0),
         (ACROSS, 6.0),
+        (lambda time: Box.sized(20 * time, 5, 14, 10) if 2 <= time < 3.2 else None, 0.0),
     ],
-    ids=["a person is upright", "a cloud is soft"],
+    ids=["a person is upright", "a cloud is soft", "one branch moves a little"],
 )
 def test_what_is_no_vehicle_is_only_noted(place: Place, soft: float) -> None:
     [finding] = watched(place, soft, 120.0).findings()
