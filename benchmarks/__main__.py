@@ -51,8 +51,8 @@ def main() -> None:
 ROWS = f"""\
 patch / dense, windows of seed.yaml | seed patch | seed dense | ≥ 2 | 4
 detectMultiScale / dense | detectMultiScale | svm dense | ≥ 3 | 8
-dense / decoding to planes | svm dense beside decoding | decoding | ≤ 1.2 | 0.8
-network / decoding to planes | network beside decoding | decoding | – | –
+dense / decoding to planes | svm dense | decoding | ≤ 1.2 | 0.8
+network / decoding to planes | network detection | decoding | – | –
 network / svm.yaml, a frame | network detection | svm detection | ≤ 2.7 | 2.1
 detect-video / plain transcode | detect | transcode | ≤ 1.5 | 1.3
 detect-video -c svm / plain transcode | detect with svm | transcode | ≤ 1.25 | –
@@ -85,7 +85,7 @@ def measure_all(folder: Path, rounds: int) -> list[Measurement]:
         **starts,
         **{f"busy {name}": (busy, 0.0) for name, (_, busy) in starts.items()},
     }
-    hour = seconds_of_count(folder, ".csv")
+    hour = seconds_of_count(folder)
     corrected, corrected_memory = cost_of_thousands(folder)
     whole, first = (peak_memory(path, folder, *extra) for extra in ((), ("--frames", "40")))
     parts = f"{whole:.0f} and {first:.0f} MB"

@@ -5,6 +5,7 @@ dark, foggy or blurred, or some vehicles are hidden from the tracker; the others
 """
 
 import argparse
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -125,32 +126,30 @@ CHANGES: dict[str, Change] = {
 
 @dataclass(frozen=True)
 class Road:
-    """A drawn road from a pole, and its images."""
+    """A drawn road from a pole, and its images by frame."""
 
     scene: Scene
     images: dict[int, Image]
-    seed: int
 
     @classmethod
     def drawn(cls, seed: int) -> "Road":
         """Draw every third frame of a random road."""
         scene = replace(pole_scene(seed), frames=125)
         renderer = Renderer(scene)
-        return cls(scene, {n: renderer.image(n) for n in range(0, scene.frames, 3)}, seed)
+        return cls(scene, {n: renderer.image(n) for n in range(0, scene.frames, 3)})
 
     def watched(self, kind: str) -> Conditions:
         """Return what watched the road where it is changed in this way."""
         conditions = Conditions(SETTINGS, self.scene.camera.width)
-        for index, image in self.images.items():
-            time = self.scene.time(index)
+        for index, drawn in self.images.items():
+            image, time = drawn, self.scene.time(index)
             tracks = true_tracks(self.scene, index)
             if kind == "hidden":
                 tracks = tuple(track for track in tracks if track.id % _HIDDEN)
-            shown = image
             if kind in CHANGES and time >= CHANGE:
-                shown = CHANGES[kind](image, np.random.default_rng(self.seed), time)
+                image = CHANGES[kind](drawn, np.random.default_rng(self.scene.seed), time)
             boxes = Boxes(boxes_of(tracks), np.full(len(tracks), 0.9))
-            conditions.add(time, Picture(shown), boxes, tracks)
+            conditions.add(time, Picture(image), boxes, tracks)
         return conditions
 
     def is_right(self, kind: str, findings: Findings) -> bool:
@@ -178,15 +177,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, nargs="+", default=range(12), help="of drawn roads")
     seeds = parser.parse_args().seeds
-    right = dict.fromkeys(EXPECTED, 0)
+    right = Counter[str]()
     for seed in seeds:
         road = Road.drawn(seed)
         results = {kind: road.is_right(kind, road.watched(kind).findings()) for kind in EXPECTED}
         wrong = [kind for kind, is_right in results.items() if not is_right]
         print(f"road {seed}: wrong: {', '.join(wrong) or 'none'}", flush=True)
-        right = {kind: right[kind] + results[kind] for kind in EXPECTED}
-    for kind, count in right.items():
-        print(f"{kind:10} {count} of {len(seeds)}")
+        right.update(kind for kind, is_right in results.items() if is_right)
+    for kind in EXPECTED:
+        print(f"{kind:10} {right[kind]} of {len(seeds)}")
 
 
 if __name__ == "__main__":

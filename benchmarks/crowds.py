@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.drawn_traffic import as_planes, follow, shown_labels, true_labels
 from vdet.config.schema import Settings
-from vdet.detect.detectors import DetectorModel, load_detector
-from vdet.evaluate.scores import Scores, score
+from vdet.detect.detectors import load_detector
+from vdet.evaluate.scores import score
 from vdet.synthetic import (
     LANE_WIDTH,
     LORRY,
@@ -68,17 +68,8 @@ def crowd(number: int) -> Scene:
                 for time, place in ((0, ahead), (half, middle), (2 * half, middle + speed * half))
             )
             vehicles.append(SceneVehicle(len(vehicles) + 1, way, random_paint(rng), body))
-    rate = Fraction(25)
-    return replace(
-        scene, vehicles=tuple(vehicles), speed=own, rate=rate, frames=int(_SECONDS * rate)
-    )
-
-
-def scores_of(scene: Scene, model: DetectorModel, settings: Settings) -> Scores:
-    """Find and follow the vehicles of a scene, and compare them with its truth."""
-    results = follow(model, settings, scene, map(as_planes, frames(scene)))
-    truth = true_labels(scene, range(scene.frames))
-    return score(shown_labels(results), truth)
+    scene = replace(scene, speed=own, rate=Fraction(25), frames=25 * _SECONDS)
+    return replace(scene, vehicles=tuple(vehicles))
 
 
 def main() -> None:
@@ -88,7 +79,11 @@ def main() -> None:
     model = load_detector(settings.detector)
     print("camera      scenes   F1     IDF1   HOTA   id switches   fragmentations")
     for camera, numbers in (("windscreen", SCENES[::2]), ("pole", SCENES[1::2])):
-        scores = [scores_of(crowd(number), model, settings) for number in numbers]
+        scores = []
+        for scene in map(crowd, numbers):
+            results = follow(model, settings, scene, map(as_planes, frames(scene)))
+            truth = true_labels(scene, range(scene.frames))
+            scores.append(score(shown_labels(results), truth))
         means = (fmean(getattr(score, name) for score in scores) for name in ("f1", "idf1", "hota"))
         sums = sum(s.id_switches for s in scores), sum(s.fragmentations for s in scores)
         row = "   ".join(f"{mean:.3f}" for mean in means)

@@ -181,7 +181,7 @@ def found_lines(drive: Drive) -> Iterator[Sample]:
 
 def by_true_boxes(scene: Scene, index: int, road: Road) -> Iterator[Sample]:
     """Give the vehicles that must be found."""
-    places = {place.id: place for place in true_places(scene, index)}
+    places = true_places(scene, index)
     for true_box in true_boxes(scene, index):
         if must_be_found(true_box, scene.camera.height):
             [track] = with_positions([Track(true_box.id, true_box.box, 1.0, "detected")], road, 0.0)
@@ -201,7 +201,7 @@ def shown_boxes(drives: Iterable[Drive], settings: Settings) -> Iterator[Sample]
 
 
 def _matched(scene: Scene, index: int, tracks: Sequence[Track]) -> Iterator[Sample]:
-    places = {place.id: place for place in true_places(scene, index)}
+    places = true_places(scene, index)
     boxes = true_boxes(scene, index)
     for track in tracks:
         best = max(boxes, key=lambda box: box.box.iou(track.box))

@@ -17,7 +17,6 @@ from vdet.run.steps import FrameResult, Step
 from vdet.synthetic import (
     LANE_WIDTH,
     STANDS,
-    LaneLine,
     Light,
     PinholeCamera,
     Scene,
@@ -124,7 +123,6 @@ def true_labels(scene: Scene, indices: Iterable[int]) -> SavedTracks:
 class TruePlace:
     """Where a vehicle stands on the road."""
 
-    id: int
     distance: float
     """Metres along the road from the camera to the vehicle's rear tyres."""
     lateral: float
@@ -134,16 +132,11 @@ class TruePlace:
     """Number of lane lines between the camera and the vehicle's middle; negative: to the left."""
 
 
-def true_places(scene: Scene, index: int) -> tuple[TruePlace, ...]:
-    """Return where the vehicles that exist at frame `index` are, seen or not, ordered by id."""
-    places = []
+def true_places(scene: Scene, index: int) -> dict[int, TruePlace]:
+    """Return where the vehicles that exist at frame `index` are, seen or not, by id."""
+    lines, places = [line.lateral for line in scene.road.lines], {}
     for place, vehicle in scene.nearest_first(scene.time(index)):
-        lane = _lane(place.lateral, scene.road.lines)
-        places.append(TruePlace(vehicle.id, place.ahead + STANDS, place.lateral, lane))
-    return tuple(sorted(places, key=lambda place: place.id))
-
-
-def _lane(lateral: float, lines: Iterable[LaneLine]) -> int:
-    """Count the lines between the camera and a point to its side; to the left they are negative."""
-    to_right = sum(0 < line.lateral < lateral for line in lines)
-    return to_right or -sum(lateral < line.lateral < 0 for line in lines)
+        to_right = sum(0 < line < place.lateral for line in lines)
+        to_left = sum(place.lateral < line < 0 for line in lines)
+        places[vehicle.id] = TruePlace(place.ahead + STANDS, place.lateral, to_right - to_left)
+    return places

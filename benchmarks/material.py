@@ -8,6 +8,7 @@ import av
 from av.video.frame import PictureType
 
 from vdet.config.loading import find_config, load_settings
+from vdet.config.schema import OutputSettings
 from vdet.detect.svm.detector import SvmModel, load_svm
 from vdet.media import Picture
 from vdet.media.reader import VideoReader
@@ -40,16 +41,14 @@ def read_pictures(path: Path) -> list[Picture]:
     return [read[index // 10 % len(read)] for index in FRAMES_SEARCHED]
 
 
-OPTIONS = {"preset": "superfast", "crf": "25"}
-"""Those of the default settings."""
-
-
 def transcode(path: Path, out: Path, frames: int) -> None:
-    """Decode and encode the first frames, and nothing else."""
+    """Decode and encode the first frames as the default settings do, and nothing else."""
+    output = OutputSettings()
+    options = {"preset": output.preset, "crf": str(output.crf)}
     with av.open(str(path)) as source, av.open(str(out), "w") as target:
         stream = source.streams.video[0]
         stream.thread_type = "AUTO"
-        encoder = target.add_stream("libx264", rate=stream.average_rate, options=OPTIONS)
+        encoder = target.add_stream("libx264", rate=stream.average_rate, options=options)
         encoder.width, encoder.height = stream.width, stream.height
         for frame in itertools.islice(source.decode(stream), frames):
             frame.pict_type = PictureType.NONE  # the encoder chooses its own

@@ -138,12 +138,12 @@ RATE, SECONDS, BOXES = 25, 3600, 1_200_000
 WIDTH, HEIGHT = 1280, 720
 
 
-def seconds_of_count(folder: Path, suffix: str) -> float:
+def seconds_of_count(folder: Path) -> float:
     """Return the processor time of the whole program for the tracks of an hour.
 
     It is one thread: on a machine without other work, this is how long it takes.
     """
-    tracks, lines = folder / f"hour{suffix}", folder / "lines.yaml"
+    tracks, lines = folder / "hour.csv", folder / "lines.yaml"
     write_hour(tracks)
     ends = [((100, y), (1180, y + 20)) for y in (300, 350, 400, 470, 560)]
     ends += [((x, 200), (x + 20, 700)) for x in (200, 400, 640, 850, 1080)]

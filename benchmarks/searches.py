@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from unittest.mock import patch
 
@@ -9,12 +10,19 @@ import av
 import cv2
 import numpy as np
 
-from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
+from vdet.boxes import Float32Array
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.detectors import load_detector
 from vdet.detect.svm.detector import SvmDetector, SvmModel
-from vdet.detect.svm.windows import DenseSearch
+from vdet.detect.svm.model import LinearModel, describe
+from vdet.detect.svm.windows import (
+    WINDOW_SIDES,
+    DenseSearch,
+    FramePyramid,
+    FrameStrip,
+    WindowGrid,
+)
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 
@@ -26,6 +34,32 @@ _OF_SVM, _OF_NETWORK = 3, 2
 _STRIDES = {"svm dense": _OF_SVM, "svm detection": _OF_SVM, "network detection": _OF_NETWORK}
 
 
+class PatchSearch:
+    """The original's search: each window is cropped, resized, described and classified on its own.
+
+    It is slow and simple. The tests and benchmarks compare the dense search with it.
+    """
+
+    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
+        self._model = model
+        self._boxes = grid.boxes.tolist()
+
+    def search(self, frame: FramePyramid, probability: float) -> tuple[Float32Array, Float32Array]:
+        """Search a frame as `DenseSearch.search`."""
+        side, regression = self._model.features.patch, self._model.box_regression
+        patches = (
+            frame.cut(FrameStrip(slice(y, y + height), slice(x, x + width), side, side))
+            for x, y, width, height in self._boxes
+        )
+        vectors = np.stack([describe(patch, self._model.features) for patch in patches])
+        probabilities = self._model.probabilities(vectors)
+        sides = np.tile(WINDOW_SIDES, (len(vectors), 1))
+        if regression is not None:
+            hits = probabilities >= probability
+            sides[hits] = regression.sides(vectors[hits, : self._model.features.hog_length])
+        return probabilities, sides
+
+
 def search_times(
     path: Path, pictures: Sequence[Picture], svm: SvmModel, seed: SvmModel, rounds: int
 ) -> dict[str, float]:
@@ -33,19 +67,20 @@ def search_times(
 
     Where not every frame of the video is searched, the searched ones count for the others too.
     """
-    searches = {
+    searches: dict[str, Task] = {
         "svm dense": _search(svm, pictures),
         "seed patch": _search(seed, pictures, PatchSearch),
         "seed dense": _search(seed, pictures),
         "detectMultiScale": _detect_multi_scale(pictures),
         "svm detection": _detection(SvmSettings(), pictures),
         "network detection": _detection(NetworkSettings(), pictures),
+        "decoding": partial(_decode, path),
     }
-    times = measure(searches, rounds)
-    per_frame = {
-        name: seconds / len(pictures) / _STRIDES.get(name, 1) for name, seconds in times.items()
+    frames = dict.fromkeys(searches, len(pictures)) | {"decoding": DECODED}
+    return {
+        name: seconds / frames[name] / _STRIDES.get(name, 1)
+        for name, seconds in measure(searches, rounds).items()
     }
-    return per_frame | _decoding(path, svm, pictures, rounds)
 
 
 def _search(config: SvmModel, pictures: Sequence[Picture], engine: type = DenseSearch) -> Task:
@@ -87,29 +122,13 @@ def _detect_multi_scale(pictures: Sequence[Picture]) -> Task:
     return run
 
 
-def _decoding(
-    path: Path, svm: SvmModel, pictures: Sequence[Picture], rounds: int
-) -> dict[str, float]:
-    """Time decoding to planes with one thread, interleaved with search and network."""
-
-    def decode() -> None:
-        with av.open(str(path)) as container:
-            stream = container.streams.video[0]
-            stream.thread_type = "NONE"
-            for _ in itertools.islice(container.decode(stream), DECODED):
-                pass
-
-    tasks = {
-        "decoding": decode,
-        "svm": _search(svm, pictures),
-        "network": _detection(NetworkSettings(), pictures),
-    }
-    times = measure(tasks, rounds)
-    return {
-        "decoding": times["decoding"] / DECODED,
-        "svm dense beside decoding": times["svm"] / len(pictures) / _OF_SVM,
-        "network beside decoding": times["network"] / len(pictures) / _OF_NETWORK,
-    }
+def _decode(path: Path) -> None:
+    """Decode frames to planes with one thread."""
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        stream.thread_type = "NONE"
+        for _ in itertools.islice(container.decode(stream), DECODED):
+            pass
 
 
 def times_by_height(pictures: Sequence[Picture], svm: SvmModel, rounds: int) -> dict[str, float]:

@@ -12,18 +12,17 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
 from pathlib import Path
 
 import av
 import cv2
 import numpy as np
 
+from benchmarks.conditions import SETTINGS as FIXED
 from benchmarks.material import find_video
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import OutputSettings, Settings
 from vdet.detect.detectors import as_model
-from vdet.evaluate import results
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.loop import Parts
@@ -38,7 +37,7 @@ ENDING = 50  # last frames, in which the reader may have closed its files and th
 SAMPLE_INTERVAL = 50  # frames between samples
 MEMORY_GROWTH = 0.10
 MIN_SPEED_RATIO = 0.85  # of the last tenth, against the first
-ROWS = 11
+REPORT_INTERVAL = 2000  # frames between printed samples
 
 
 @dataclass(frozen=True)
@@ -75,9 +74,10 @@ class ResourceMonitor:
         before = self._frames
         self._frames += frames
         if self._frames // SAMPLE_INTERVAL > before // SAMPLE_INTERVAL:
-            self.samples.append(self._sample())
-            if self._frames % 1000 < SAMPLE_INTERVAL:
-                print(f"\r{self._frames} frames", end="", file=sys.stderr, flush=True)
+            sample = self._sample()
+            self.samples.append(sample)
+            if self._frames // REPORT_INTERVAL > before // REPORT_INTERVAL:
+                print(sample, flush=True)
 
     def _sample(self) -> Sample:
         status = Path("/proc/self/status").read_text(encoding="ascii")
@@ -140,17 +140,6 @@ def _speed(start: Sample, end: Sample) -> float:
     return (end.frames - start.frames) / (end.seconds - start.seconds)
 
 
-def table(samples: Sequence[Sample]) -> list[str]:
-    """Return some of the samples as lines, each with the speed since the line before."""
-    step = max(1, (len(samples) - 1) // (ROWS - 1))
-    rows = []
-    for before, now in pairwise([*samples[:-1:step], samples[-1]]):
-        values = f"{_speed(before, now):.1f}", f"{now.memory:.0f}", f"{now.peak:.0f}"
-        rows.append((str(now.frames), *values, str(now.files), str(now.threads)))
-    headings = "frames", "frames/s", "memory MB", "peak MB", "files", "threads"
-    return results.table(headings, rows)
-
-
 def loop_video(source: Path, target: Path, frames: int) -> None:
     """Repeat the packets of a video until it has at least `frames` frames; sound is left out."""
     with av.open(str(source)) as once:
@@ -164,11 +153,6 @@ def loop_video(source: Path, target: Path, frames: int) -> None:
             if packet.dts is not None:
                 packet.stream = stream
                 output.mux(packet)
-
-
-FIXED = Settings.model_validate(
-    {"traffic": {"lines": [{"name": "gate", "start": (0, 0.6), "end": (1, 0.6)}]}}
-)
 
 
 def write_fixed(folder: Path) -> Path:
@@ -186,7 +170,7 @@ def write_fixed(folder: Path) -> Path:
 
 
 def main() -> None:
-    """Run, print the samples and what grew; the exit code is 1 where something grew."""
+    """Run, print samples and what grew; the exit code is 1 where something grew."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=main.__doc__)
     parser.add_argument("--frames", type=int, help="at least 1000")
     parser.add_argument("--fixed", action="store_true", help="of a fixed camera, without search")
@@ -205,8 +189,6 @@ def main() -> None:
             outputs, settings, parts = outputs[1:], FIXED, Parts(as_model(lambda _: NO_BOXES))
         run = Run(folder / "long.mp4", tuple(outputs), settings, frames=frames)
         totals = run_video(run, parts, progress=monitor)
-    print(file=sys.stderr)
-    print("\n".join(table(monitor.samples)))
     first, last = tenths(monitor.samples)
     print(f"\n{totals.frames} frames in {totals.seconds:.0f} s, {totals.tracks} tracks")
     print(f"first tenth {first:.1f} frames/s, last tenth {last:.1f}")

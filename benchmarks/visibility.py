@@ -62,9 +62,6 @@ class Searched:
     found: int
 
 
-Searches = Sequence[Searched]
-
-
 def main() -> None:
     """Write the weights of `visibility`, and print what the other sets tell of each set."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -152,30 +149,30 @@ def _both(
         yield Searched(name, change, tuple(look.tolist()), len(truth), found)
 
 
-def _looks(searches: Searches) -> Float64Array:
+def _looks(searches: Sequence[Searched]) -> Float64Array:
     return np.array([item.look for item in searches])
 
 
-def _weighted(searches: Searches) -> tuple[Float64Array, Float64Array]:
+def _weighted(searches: Sequence[Searched]) -> tuple[Float64Array, Float64Array]:
     """Return the vehicles that are found and missed; a picture of many counts like one of six."""
     every, found = np.array([(item.vehicles, item.found) for item in searches], np.float64).T
     usual = np.minimum(1, 6 / every)
     return found * usual, (every - found) * usual
 
 
-def _log_odds(searches: Searches) -> float:
+def _log_odds(searches: Sequence[Searched]) -> float:
     """Return the log odds to find a vehicle in pictures as they are."""
     found, missed = _weighted([item for item in searches if not item.change])
     return float(np.log(found.sum() / missed.sum()))
 
 
-def _fit_recall(searches: Searches) -> list[float]:
+def _fit_recall(searches: Sequence[Searched]) -> list[float]:
     """Return the weights of the fraction of vehicles that are found, and the bias."""
     looks, is_found = _looks(searches), np.repeat([1, 0], len(searches))
     return _fit(np.vstack([looks, looks]), is_found, np.concatenate(_weighted(searches)))
 
 
-def _fit_drops(searches: Searches) -> list[float]:
+def _fit_drops(searches: Sequence[Searched]) -> list[float]:
     """Return the weights of drops on the lens, and the bias, where one sees well without."""
     sees_well = visibility.dim(_looks(searches), 1.2) == ""
     used = [n for n, item in enumerate(searches) if item.change in ("", "drops") and sees_well[n]]
@@ -189,7 +186,7 @@ def _fit(looks: Float64Array, is_so: Int64Array, counts: Float64Array) -> list[f
     return [*map(float, model.coef_[0]), float(model.intercept_[0])]
 
 
-def _recall_lines(searches: Searches, recalls: Float64Array) -> list[str]:
+def _recall_lines(searches: Sequence[Searched], recalls: Float64Array) -> list[str]:
     """Return the recall by visibility, of pictures as they are, and of drawn drops."""
     rows: dict[str, list[tuple[float, float, int]]] = defaultdict(list)
     codes = visibility.reasons(_looks(searches)).tolist()
@@ -205,7 +202,7 @@ def _recall_lines(searches: Searches, recalls: Float64Array) -> list[str]:
     return lines
 
 
-def _drops_lines(searches: Searches, drops: Float64Array) -> list[str]:
+def _drops_lines(searches: Sequence[Searched], drops: Float64Array) -> list[str]:
     """Return how often drops are reported where it is not dark, hazy or blurred."""
     changes = np.array([item.change for item in searches])
     sees_well = visibility.dim(_looks(searches)) == ""

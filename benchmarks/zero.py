@@ -11,7 +11,7 @@ all vehicles have tracks. Of 100 more, half are put together of two.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -176,15 +176,7 @@ def insects(rng: np.random.Generator) -> Overlay:
     return draw
 
 
-MOVING: dict[str, Callable[[np.random.Generator], Overlay]] = {
-    "people": people,
-    "trees": trees,
-    "rain": rain,
-    "snow": snow,
-    "clouds": clouds,
-    "glare": glare,
-    "insects": insects,
-}
+MOVING = (people, trees, rain, snow, clouds, glare, insects)
 
 
 @dataclass(frozen=True)
@@ -196,8 +188,10 @@ class Clip:
     change: str = ""
     is_tracked: bool = False
 
-    def images(self) -> Iterator[tuple[float, Image]]:
-        """Yield the frames with their times, seconds."""
+    def findings(self) -> tuple[Finding, ...]:
+        """Return the findings; without tracks, unless all vehicles have one."""
+        settings = Settings() if self.scene.speed else SETTINGS  # lines are for fixed cameras
+        watch = Conditions(settings, self.scene.camera.width)
         renderer = Renderer(self.scene)
         for index in range(self.scene.frames):
             time, image = self.scene.time(index), renderer.image(index)
@@ -205,13 +199,6 @@ class Clip:
                 image = self.overlay(image, time)
             if self.change:
                 image = CHANGES[self.change](image, np.random.default_rng(self.scene.seed), time)
-            yield time, image
-
-    def findings(self) -> tuple[Finding, ...]:
-        """Return the findings; without tracks, unless all vehicles have one."""
-        settings = Settings() if self.scene.speed else SETTINGS  # lines are for fixed cameras
-        watch = Conditions(settings, self.scene.camera.width)
-        for index, (time, image) in enumerate(self.images()):
             tracks = true_tracks(self.scene, index) if self.is_tracked else ()
             watch.add(time, Picture(image), NO_BOXES, tracks)
         return watch.findings().items
@@ -277,10 +264,10 @@ def main() -> None:
     """Print a row for each kind of clip."""
     first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     compare_cuts(first)
-    for name, overlay in MOVING.items():
+    for overlay in MOVING:
         seeds = range(first, first + 5)
         clips = [Clip(road(seed), overlay(np.random.default_rng(seed))) for seed in seeds]
-        compare(f"no vehicle: {name}", clips)
+        compare(f"no vehicle: {overlay.__name__}", clips)
     drives = [Clip(road(first + n, speed=18.0 + 3 * n)) for n in range(5)]
     compare("no vehicle: driving", drives)
     for change in ("", "night", "fog", "drops"):

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from benchmarks.soak import Sample, find_growth, table, tenths
+from benchmarks.soak import Sample, find_growth, tenths
 
 STEADY = [
     Sample(frames, frames / 100, 290 + frames % 7, min(300, 200 + frames), 20, 12)
@@ -55,9 +55,3 @@ def test_a_run_that_gets_slower_is_named(speed: float, slow: bool) -> None:
     ]
     words = [f"the last tenth ran at {speed:.1f} frames/s, the first at 100.0"]
     assert find_growth(slowing) == (words if slow else [])
-
-
-def test_the_table_has_a_line_for_each_tenth() -> None:
-    lines = table(STEADY)
-    assert len(lines) == 11
-    assert lines[-1].split() == ["20000", "100.0", "291", "300", "20", "12"]

@@ -1,7 +1,7 @@
 """Drawn scenes, and the truth of their vehicles."""
 
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -126,11 +126,7 @@ def test_hidden_is_the_fraction_of_the_farther_vehicle_that_the_nearer_one_cover
 def test_places_are_those_of_the_rear_tyres_and_lanes_are_counted_by_lines() -> None:
     vehicles = [(5, 10.0, 0.3), (1, 30.0, -3.7), (2, 25.0, 2.0), (7, -8.0, 3.7)]
     scene = make_scene(*(parked(*vehicle) for vehicle in vehicles))
-    found = {
-        place.id: (place.distance, place.lateral, place.lane) for place in true_places(scene, 0)
-    }
-    assert list(found) == [1, 2, 5, 7]
-    assert found == {
+    assert {n: astuple(place) for n, place in true_places(scene, 0).items()} == {
         number: pytest.approx((ahead + STANDS, lateral, lane))
         for (number, ahead, lateral), lane in zip(vehicles, (0, -1, 1, 1), strict=True)
     }

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from benchmarks.patch_search import PatchSearch
+from benchmarks.searches import PatchSearch
 
 from drawn_patches import draw_patches
 from seed import SEED
