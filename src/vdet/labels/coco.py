@@ -20,7 +20,7 @@ from math import nan
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO, TypeVar
 
-from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, AliasPath, FailFast, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from vdet.boxes import Box
@@ -136,14 +136,6 @@ class _Category:
 
 
 @_entry
-class _Attributes:
-    """What CVAT has in `attributes`; other programs have values of their own there."""
-
-    track_id: Any = None
-    occluded: Any = False
-
-
-@_entry
 class _Annotation:
     image_id: int
     category_id: int
@@ -152,18 +144,19 @@ class _Annotation:
     track_id: Index | None = None
     score: Number = 1.0
     foot: tuple[Number, Number] | None = None
-    attributes: _Attributes | None = None
+    attributes: dict[str, Any] | None = None
+    """CVAT has `track_id` and `occluded` there, other programs have values of their own."""
 
     def track(self, position: str, name: str) -> Track:
         """Return the box with this name; `NO_ID` without a track."""
-        attributes = self.attributes or _Attributes()
-        id_ = attributes.track_id if self.track_id is None else self.track_id
+        attributes = self.attributes or {}
+        id_ = attributes.get("track_id") if self.track_id is None else self.track_id
         x, y, width, height = self.bbox
         return Track(
             id_ if isinstance(id_, int) and 0 <= id_ <= LIMIT else NO_ID,
             Box.sized(x, y, width, height),
             self.score,
-            "predicted" if attributes.occluded else "detected",
+            "predicted" if attributes.get("occluded") else "detected",
             name,
             self.foot,
             position=position,
@@ -194,24 +187,16 @@ class _Image:
 
 
 @_entry
-class _Info:
-    unlabelled_classes: tuple[str, ...] = ()
-    """A key of our own: classes that the images may show without a label."""
-
-
-@_entry
-class _CocoVideo:
-    vdet: SourceVideo | None = None
-    """A key of our own."""
-
-
-@_entry
 class _CocoDocument:
     images: _Entries[_Image]
     categories: _Entries[_Category] = Field(default_factory=list)
     annotations: _Entries[_Annotation] = Field(default_factory=list)
-    videos: list[_CocoVideo] = Field(default_factory=list)
-    info: _Info | None = None
+    video: SourceVideo | None = Field(None, validation_alias=AliasPath("videos", 0, "vdet"))
+    """A key of our own."""
+    unlabelled: tuple[str, ...] = Field(
+        (), validation_alias=AliasPath("info", "unlabelled_classes")
+    )
+    """A key of our own: classes that the images may show without a label."""
 
 
 _DOCUMENT = TypeAdapter(_CocoDocument)
@@ -273,8 +258,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     size = document.images[0].size if images else None
     frames = {frame: boxes[image.id] for frame, image in images.items() if boxes[image.id]}
     saved = SavedTracks(frames, tuple(sorted(images)), checked_times(path, times), size)
-    video = document.videos[0].vdet if document.videos else None
-    return saved.of_video(video) if video else saved
+    return saved.of_video(document.video) if document.video else saved
 
 
 def _read_head(path: Path, data: bytes) -> SavedTracks:
@@ -306,5 +290,5 @@ def read_coco_images(path: Path) -> Iterator[LabelledImage]:
             file=path,
             labels=tuple(boxes[image.id]),
             size=image.size,
-            unlabelled=document.info.unlabelled_classes if document.info else (),
+            unlabelled=document.unlabelled,
         )
