@@ -238,8 +238,8 @@ def _dask_backend(client: Any) -> Any:
 class SearchThreads(ThreadPoolExecutor):
     """Threads for the search; at the end of the block, calls that have not begun are cancelled."""
 
-    def __init__(self, count: int, name: str = "vdet-search") -> None:
-        super().__init__(count, thread_name_prefix=name)
+    def __init__(self, count: int) -> None:
+        super().__init__(count, thread_name_prefix="vdet-search")
         self._count = count
 
     def __exit__(self, *_: object) -> None:
@@ -263,19 +263,19 @@ class SearchThreads(ThreadPoolExecutor):
             yield item, future.result()
 
 
-class _Thread(SearchThreads):
-    """A thread that makes calls in turn.
+@contextlib.contextmanager
+def _thread(name: str) -> Iterator[ThreadPoolExecutor]:
+    """Yield a thread that makes calls in turn.
 
     At the end of the block, pending calls are still made, but waited for only `JOIN_TIMEOUT`.
     """
-
-    def __init__(self, name: str) -> None:
-        super().__init__(1, name)
-
-    def __exit__(self, *_: object) -> None:
+    thread = ThreadPoolExecutor(1, name)
+    try:
+        yield thread
+    finally:
         with contextlib.suppress(RuntimeError):  # the interpreter exits, and its threads have ended
-            hangs = wait([self.submit(int)], JOIN_TIMEOUT).not_done
-            self.shutdown(wait=not hangs)
+            hangs = wait([thread.submit(int)], JOIN_TIMEOUT).not_done
+            thread.shutdown(wait=not hangs)
 
 
 @contextlib.contextmanager
@@ -286,7 +286,7 @@ def read_async(source: contextlib.AbstractContextManager[S]) -> Iterator[tuple[S
     exits.
     """
     ahead: deque[Future[Any]] = deque()
-    with _Thread("vdet-read") as thread:
+    with _thread("vdet-read") as thread:
         try:
             value = thread.submit(source.__enter__).result()
             iterator: Iterator[Any] = iter(value)  # type: ignore[call-overload]
@@ -314,7 +314,7 @@ def write_async(
     The thread enters and exits the context manager `within`, with the error of the block if there
     is one. An error in the thread is raised by a later call, or when the block ends.
     """
-    with _Thread("vdet-write") as thread:
+    with _thread("vdet-write") as thread:
         waiting: deque[Future[Any]] = deque([thread.submit(within.__enter__)])
 
         def put(item: T) -> None:
