@@ -9,9 +9,10 @@ from learn.net.blocks import block_picture, block_source
 from vdet.config.schema import NetworkTrainingSettings
 from vdet.learn.net.augmentation import (
     ImageDrawing,
-    Paster,
     SampleDrawer,
+    rare_objects,
     repeat_factors,
+    with_rare_objects,
     with_signs,
     with_weather,
 )
@@ -135,9 +136,9 @@ def test_signs_are_background_and_cover_no_object() -> None:
 def test_objects_of_rare_classes_are_pasted_with_their_boxes() -> None:
     blocks = [replace(e, classes=np.zeros_like(e.classes)) for e in block_source(20).samples]
     [white] = black_on_white().samples
-    paster = Paster([*blocks, replace(white, classes=np.array([1]))])
+    rare = rare_objects([*blocks, replace(white, classes=np.array([1]))])
     plain = without_objects(np.full((352, 640, 3), 255, np.uint8))
-    drawn = [paster.paste(np.random.default_rng(seed), plain) for seed in range(40)]
+    drawn = [with_rare_objects(np.random.default_rng(seed), plain, rare) for seed in range(40)]
     pasted = [item for item in drawn if len(item.boxes)]
     assert 4 <= len(pasted) <= 24
     assert plain.image.min() == 255, "the picture itself is not changed"

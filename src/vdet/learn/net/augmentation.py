@@ -292,6 +292,10 @@ _SIGNS = 0.3  # fraction of images that get signs
 _MAX_SIGNS = 3  # signs in an image
 
 
+Objects = Sequence[Sequence[tuple[NetSample, int]]]
+"""The objects of each class: a sample, and the row of the object in it."""
+
+
 @dataclass(frozen=True, slots=True)
 class ImageDrawing:
     """How images are drawn at a training step.
@@ -325,7 +329,7 @@ class SampleDrawer:
         chances /= chances.sum()
         chances *= repeat_factors(self._samples, chances, REPEAT_THRESHOLD)
         self._chances = chances / chances.sum()
-        self._paster = Paster(self._samples)
+        self._rare = rare_objects(self._samples)
 
     def draw(self, rng: np.random.Generator, drawing: ImageDrawing) -> NetSample:
         """Return one training image with the vehicles in it."""
@@ -339,7 +343,7 @@ class SampleDrawer:
             sample = _random_view(rng, self._pick(rng), size, scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        sample = with_signs(rng, self._paster.paste(rng, sample))
+        sample = with_signs(rng, with_rare_objects(rng, sample, self._rare))
         sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
         may_have_lamps = ~sample.ignored & (sides[:, 0] > 0.45 * sides[:, 1])  # people have none
         image = _recolored(rng, sample.image)
@@ -390,30 +394,29 @@ def repeat_factors(
     return np.asarray(factors.max(axis=1).clip(1.0), np.float64)
 
 
-class Paster:
-    """Pastes objects of the rare classes in `samples` into images, with their surroundings.
+def rare_objects(samples: Sequence[NetSample]) -> Objects:
+    """Return the objects of each rare class that can be pasted into images."""
+    objects: dict[int, list[tuple[NetSample, int]]] = {}
+    for sample in samples:
+        for row in _whole(sample):
+            objects.setdefault(int(sample.classes[row]), []).append((sample, row))
+    limit = _RARE * sum(map(len, objects.values())) / max(1, len(objects))
+    return [of_class for _, of_class in sorted(objects.items()) if len(of_class) < limit]
+
+
+def with_rare_objects(rng: np.random.Generator, sample: NetSample, rare: Objects) -> NetSample:
+    """Sometimes paste objects of rare classes into a sample, with their surroundings.
 
     Source: Ghiasi et al., "Simple Copy-Paste is a Strong Data Augmentation Method", 2021.
     """
-
-    def __init__(self, samples: Sequence[NetSample]) -> None:
-        objects: dict[int, list[tuple[NetSample, int]]] = {}
-        for sample in samples:
-            for row in _whole(sample):
-                objects.setdefault(int(sample.classes[row]), []).append((sample, row))
-        limit = _RARE * sum(map(len, objects.values())) / max(1, len(objects))
-        self._rare = [item for _, item in sorted(objects.items()) if len(item) < limit]
-
-    def paste(self, rng: np.random.Generator, sample: NetSample) -> NetSample:
-        """Return the sample, sometimes with objects of rare classes pasted into it."""
-        if not self._rare or rng.random() >= _PASTED:
-            return sample
-        sample = replace(sample, image=sample.image.copy())
-        for _ in range(int(rng.integers(1, _MAX_PASTED + 1))):
-            rare = self._rare[int(rng.integers(len(self._rare)))]
-            donor, row = rare[int(rng.integers(len(rare)))]
-            sample = _paste(rng, sample, donor, row)
+    if not rare or rng.random() >= _PASTED:
         return sample
+    sample = replace(sample, image=sample.image.copy())
+    for _ in range(int(rng.integers(1, _MAX_PASTED + 1))):
+        of_class = rare[int(rng.integers(len(rare)))]
+        donor, row = of_class[int(rng.integers(len(of_class)))]
+        sample = _paste(rng, sample, donor, row)
+    return sample
 
 
 def _whole(sample: NetSample) -> list[int]:
