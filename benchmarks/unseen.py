@@ -155,7 +155,7 @@ def measure(
     for labelled in sets:
         name = Path(labelled.name).name
         counting = Counting(0.0, _MIN_WIDTHS[name in _HIGH])
-        [measured] = evaluate_images([labelled], model, counting).sources
+        [measured] = evaluate_images([labelled], model, counting)
         every = pool([image.every for image in measured.images])
         names = (*every.vehicle_names, None)  # -1 is the last
         for frame in every.frames:

@@ -12,9 +12,9 @@ from vdet.boxes import Box, Boxes
 from vdet.evaluate.results import (
     Counting,
     ImageScores,
-    ImagesResult,
     MeasuredImage,
     MeasuredSet,
+    mean_scores,
 )
 from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.track.track import Track
@@ -119,7 +119,7 @@ class TestMean:
         bad = source(Searched([at(0), at(300), at(600)], []))
         empty = source(Searched([], [(0.9, at(0))]))
         assert (empty.scores.f1, empty.scores.false_positives) == (0, 1)
-        mean = ImagesResult(PLAIN, (good, bad, empty)).mean
+        mean = mean_scores([good, bad, empty])
         assert (mean.images, mean.vehicles, mean.matches, mean.false_positives) == (3, 4, 1, 1)
         assert (mean.recall, mean.f1) == (0.5, 0.5)
 
@@ -127,6 +127,6 @@ class TestMean:
         low = source(Searched([at(0)], [(0.3, at(0)), (0.1, at(500))]))
         high = source(Searched([at(0)], [(0.8, at(0)), (0.6, at(500)), (0.5, at(700))]))
         assert (low.scores.best_score, high.scores.best_score) == (0.3, 0.8)
-        mean = ImagesResult(PLAIN, (low, high)).mean
+        mean = mean_scores([low, high])
         assert mean.best_score == 0.3
         assert mean.best_f1 == pytest.approx((1 + 0.5) / 2)

@@ -51,7 +51,7 @@ def test_results_do_not_depend_on_threads(red_set: LabelledImages, model: SvmMod
     alone = evaluate_images([red_set], model, COUNTING, progress=lambda *_: done.append)
     together = evaluate_images([red_set], model, COUNTING, threads=3)
     assert done == [1] * 6
-    images = [result.sources[0].images for result in (alone, together)]
+    images = [measured.images for (measured,) in (alone, together)]
     for one, other, image in zip(*images, red_set.images, strict=True):
         assert one.labelled is image is other.labelled
         for frame, same in zip(one.every.frames, other.every.frames, strict=True):

@@ -15,7 +15,6 @@ from vdet.evaluate.results import (
     TRUE,
     ClipResult,
     Counting,
-    ImagesResult,
     MeasuredImage,
     MeasuredSet,
     RunName,
@@ -93,8 +92,8 @@ class TestPictures:
     COUNTING = Counting(0.5, 0.0)
     CAR = Boxed("car", (20, 10, 40, 30))
 
-    def result(self, folder: Path, *found: tuple[float, float, float, float]) -> ImagesResult:
-        """Return the result where these boxes are found in two pictures, one without a car."""
+    def measured(self, folder: Path, *found: tuple[float, float, float, float]) -> MeasuredSet:
+        """Return the set where these boxes are found in two pictures, one without a car."""
         cow = Boxed("cow", (0, 0, 5, 5))
         pictures = {"a": Labelled(100, 60, (self.CAR, cow)), "b": Labelled(100, 60)}
         labelled = read_labelled_images(write_coco(folder, pictures))
@@ -103,21 +102,23 @@ class TestPictures:
         images = [
             MeasuredImage.of(picture, 100, shown, self.COUNTING) for picture in labelled.images
         ]
-        return ImagesResult(self.COUNTING, (MeasuredSet(labelled, images),))
+        return MeasuredSet(labelled, images)
 
     def test_the_page_names_detector_source_and_labels_left_out(self, tmp_path: Path) -> None:
-        result = self.result(tmp_path / "a_$x_{$ set", self.CAR.box)
-        html = images_report(result, RunName("net", Path("x/my.onnx"), "net")).page()
+        measured = self.measured(tmp_path / "a_$x_{$ set", self.CAR.box)
+        name = RunName("net", Path("x/my.onnx"), "net")
+        html = images_report([measured], self.COUNTING, name).page()
         assert "detector net, model my.onnx, settings net" in html
         assert "boxes from score 0.50" in html
         assert "not vehicles in" in html
         assert "cow (1)" in html
 
     def test_a_page_where_nothing_is_found_can_be_made(self, tmp_path: Path) -> None:
-        assert "1 missed" in images_report(self.result(tmp_path), NAME).page()
+        report = images_report([self.measured(tmp_path)], self.COUNTING, NAME)
+        assert "1 missed" in report.page()
 
     def test_those_with_mistakes_are_shown_with_their_boxes(self, tmp_path: Path) -> None:
-        first, second = worst_tiles(self.result(tmp_path, (70, 10, 20, 30)).sources[0])
+        first, second = worst_tiles(self.measured(tmp_path, (70, 10, 20, 30)))
         assert (first.title, first.caption) == ("a.png", "1 missed, 1 false alarm")
         assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarm")
         for color in (TRUE, DETECTED):

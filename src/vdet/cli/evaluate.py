@@ -53,8 +53,8 @@ def images(
     shown = settings.detector
     counting = Counting(shown.min_score_still, min_width, shown.class_minima)
     with progress_bars(" images") as progress:
-        score = evaluate_images(sets, detector, counting, threads=core_count(), progress=progress)
-    results.print_report(images_report(score, _run_name(settings, source)))
+        scores = evaluate_images(sets, detector, counting, threads=core_count(), progress=progress)
+    results.print_report(images_report(scores, counting, _run_name(settings, source)))
 
 
 @command()

@@ -199,30 +199,17 @@ class MeasuredSet:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ImagesResult:
-    """The measured sources, and the rule for which boxes count."""
-
-    counting: Counting
-    sources: tuple[MeasuredSet, ...]
-
-    @property
-    def mean(self) -> ImageScores:
-        """The mean over the sources."""
-        scores = [source.scores for source in self.sources]
-        with_vehicles = [score for score in scores if score.vehicles] or scores
-        means: dict[str, Any] = {}
-        for name in (column.name for column in fields(ImageScores)):
-            total = sum(getattr(score, name) for score in scores)
-            ratios = [getattr(score, name) for score in with_vehicles]
-            means[name] = total if isinstance(total, int) else fmean(ratios)
-        best, at_score = best_f1([source.ranked for source in self.sources])
-        return ImageScores(**means | {"best_f1": best, "best_score": at_score})
-
-    @property
-    def comparison(self) -> Comparison:
-        """The vehicles and the detections that count, of all sources."""
-        return pool([image.shown for source in self.sources for image in source.images])
+def mean_scores(sources: Sequence[MeasuredSet]) -> ImageScores:
+    """Return the mean over sources."""
+    scores = [source.scores for source in sources]
+    with_vehicles = [score for score in scores if score.vehicles] or scores
+    means: dict[str, Any] = {}
+    for name in (column.name for column in fields(ImageScores)):
+        total = sum(getattr(score, name) for score in scores)
+        ratios = [getattr(score, name) for score in with_vehicles]
+        means[name] = total if isinstance(total, int) else fmean(ratios)
+    best, at_score = best_f1([source.ranked for source in sources])
+    return ImageScores(**means | {"best_f1": best, "best_score": at_score})
 
 
 def evaluate_images(
@@ -232,7 +219,7 @@ def evaluate_images(
     *,
     threads: int = 1,
     progress: Progress = no_progress,
-) -> ImagesResult:
+) -> list[MeasuredSet]:
     """Search all images, each on its own, and score each set.
 
     Parameters
@@ -263,7 +250,7 @@ def evaluate_images(
                 measured.append(result)
                 advance(1)
         sources.append(MeasuredSet(labelled, measured))
-    return ImagesResult(counting, tuple(sources))
+    return sources
 
 
 def best_f1(sources: Sequence[RankedPredictions]) -> tuple[float, float]:
@@ -533,13 +520,14 @@ def _joined(*parts: Sequence[str]) -> list[str]:
     return [line for part in parts if part for line in ("", *part)][1:]
 
 
-def images_report(result: ImagesResult, name: RunName) -> Report:
+def images_report(measured: Sequence[MeasuredSet], counting: Counting, name: RunName) -> Report:
     """Report the scores of labelled images: a row for each source, and their mean."""
-    counting, mean, classes = result.counting, result.mean, class_results(result.comparison)
-    rows = [(source.labelled.name, source.scores) for source in result.sources]
+    mean = mean_scores(measured)
+    classes = class_results(pool([image.shown for source in measured for image in source.images]))
+    rows = [(source.labelled.name, source.scores) for source in measured]
     sources = [
         {"source": title, **asdict(scores), "not_vehicles": dict(source.labelled.omitted)}
-        for source, (title, scores) in zip(result.sources, rows, strict=True)
+        for source, (title, scores) in zip(measured, rows, strict=True)
     ]
     if len(rows) > 1:
         with_vehicles = sum(scores.vehicles > 0 for _, scores in rows)
@@ -549,10 +537,10 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
         [name.line, f"boxes from score {counting.score:.2f}{width}"],
         _score_table("source", _OF_IMAGES, rows),
         _class_table(classes),
-        [_omitted(source) for source in result.sources if source.labelled.omitted],
+        [_omitted(source) for source in measured if source.labelled.omitted],
     )
     values = {"mean": asdict(mean), "sources": sources, "classes": list(map(asdict, classes))}
-    sheets = [(source.labelled.name, worst_tiles(source)) for source in result.sources]
+    sheets = [(source.labelled.name, worst_tiles(source)) for source in measured]
     return Report(lines, {**name.values, **asdict(counting), **values}, sheets)
 
 
