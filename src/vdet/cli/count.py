@@ -43,11 +43,7 @@ if TYPE_CHECKING:
     help="Frame rate of the video, for TRACKS without times.",
 )
 @click.option(
-    "--class",
-    "classes",
-    metavar="NAME",
-    multiple=True,
-    help=f"{options.CLASS_HELP} (`classes`).",
+    "--class", "classes", metavar="NAME", multiple=True, help=f"{options.CLASS_HELP} (`classes`)."
 )
 @options.strict_option
 @options.settings_options

@@ -129,17 +129,10 @@ def _print_vehicles(result: "FrameResult") -> None:
     "vehicles have clips.",
 )
 @options.setting_option(
-    "clips.margin",
-    "--margin",
-    type=float,
-    metavar="SECONDS",
-    help="Time added around each clip",
+    "clips.margin", "--margin", type=float, metavar="SECONDS", help="Time added around each clip"
 )
 @options.setting_option(
-    "clips.exact",
-    "--exact",
-    is_flag=True,
-    help="Cut clips at exact frames, by encoding again",
+    "clips.exact", "--exact", is_flag=True, help="Cut clips at exact frames, by encoding again"
 )
 @options.counts_option
 @options.flows_option

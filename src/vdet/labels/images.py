@@ -19,13 +19,7 @@ from vdet.boxes import Box, Image
 from vdet.config.loading import parse_document
 from vdet.errors import ConfigError, ImageError, TruthError, printable
 from vdet.files import is_hidden
-from vdet.labels.label import (
-    NO_ID,
-    Size,
-    line_error,
-    numbered_lines,
-    read_bytes,
-)
+from vdet.labels.label import NO_ID, Size, line_error, numbered_lines, read_bytes
 from vdet.media.images import is_image_name, read_header, read_image
 from vdet.track.track import Track
 
