@@ -611,7 +611,7 @@ def run_batch(
     ------
     OutputError
         The manifest, or the output folder, cannot be written.
-    ClusterError
+    BatchError
         The cluster of `workers` cannot be used, or its scheduler has ended.
     """
     make_folder(plan.folder)

@@ -121,11 +121,7 @@ class TruthError(VdetError, ValueError):
 
 
 class BatchError(VdetError, ValueError):
-    """A batch cannot be run with these inputs and outputs."""
-
-
-class ClusterError(VdetError, OSError):
-    """A cluster cannot be used."""
+    """A batch cannot be run with these inputs and outputs, or on this cluster."""
 
 
 _NO_MEMORY = "failed to map segment"  # the system, when there is no memory to load a library

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from vdet.errors import INTERRUPTED, ClusterError, needing
+from vdet.errors import INTERRUPTED, BatchError, needing
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -181,7 +181,7 @@ class DaskCluster:
         ------
         PackageError
             Dask is not installed.
-        ClusterError
+        BatchError
             The scheduler does not respond, has no worker, or ends.
         """
         with needing("dask"):
@@ -195,11 +195,11 @@ class DaskCluster:
             except (OSError, ValueError) as error:  # ValueError: not the form of an address
                 advice = "start them with `dask scheduler` and `dask worker`"
                 lack = f"no Dask scheduler with a worker responds; {advice}"
-                raise ClusterError(f"{self.address}: {lack}") from error
+                raise BatchError(f"{self.address}: {lack}") from error
             try:
                 yield _dask_backend(client)
             except CancelledError as error:
-                raise ClusterError(f"{self.address}: the scheduler has ended; run again") from error
+                raise BatchError(f"{self.address}: the scheduler has ended; run again") from error
 
 
 Workers = LocalProcesses | DaskCluster

@@ -14,7 +14,7 @@ import pytest
 
 from conftest import Run
 from running import Gate, frames_of, names, start, until, with_modules, write_drive
-from vdet.errors import ClusterError, PackageError
+from vdet.errors import BatchError, PackageError
 from vdet.workers import DaskCluster, call_all
 
 distributed = pytest.importorskip("distributed")
@@ -146,7 +146,7 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> Non
     clip = write_drive(tmp_path / "clip.mp4", 150)
     out = tmp_path / "out"
     with scheduler(tmp_path) as (cluster, process):
-        with pytest.raises(ClusterError, match="no Dask scheduler with a worker responds"):
+        with pytest.raises(BatchError, match="no Dask scheduler with a worker responds"):
             next(call_all(abs, [1], DaskCluster(cluster.address, timeout=0.5)))
         worker = dask("worker", "--no-nanny", folder=tmp_path)
         try:
@@ -169,7 +169,7 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> Non
     "address", ["tcp://127.0.0.1:9", "nonsense://x", "tcp://no.such.host.invalid:1"]
 )
 def test_no_scheduler_there(address: str) -> None:
-    with pytest.raises(ClusterError, match="no Dask scheduler with a worker responds"):
+    with pytest.raises(BatchError, match="no Dask scheduler with a worker responds"):
         next(call_all(abs, [1], DaskCluster(address, timeout=0.5)))
 
 
