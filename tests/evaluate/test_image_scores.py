@@ -9,13 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.boxes import Box, Boxes
-from vdet.evaluate.results import (
-    Counting,
-    ImageScores,
-    MeasuredImage,
-    MeasuredSet,
-    mean_scores,
-)
+from vdet.evaluate.results import Counting, ImageScores, MeasuredImage, MeasuredSet, mean_scores
 from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.track.track import Track
 

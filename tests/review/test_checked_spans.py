@@ -10,15 +10,7 @@ from benchmarks.pole_cameras import HEIGHT as POLE_HEIGHT
 from benchmarks.pole_cameras import WIDTH as POLE_WIDTH
 from benchmarks.pole_cameras import pole_scene
 
-from review.test_corrections import (
-    corrected,
-    counts,
-    error,
-    events_of,
-    missed,
-    saved,
-    ways,
-)
+from review.test_corrections import corrected, counts, error, events_of, missed, saved, ways
 from vdet.errors import ConfigError
 from vdet.review.corrections import apply_corrections
 from vdet.traffic.counting import count_frames

@@ -11,15 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from red_cars import (
-    PERSPECTIVE,
-    SETTINGS,
-    by_perspective,
-    car_at,
-    drive,
-    red_model,
-    road,
-)
+from red_cars import PERSPECTIVE, SETTINGS, by_perspective, car_at, drive, red_model, road
 from run.red_runs import follow, outputs, run_red
 from running import write_drive
 from vdet.boxes import Image

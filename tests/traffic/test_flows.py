@@ -98,9 +98,7 @@ def test_there_is_a_row_for_each_interval_direction_and_class() -> None:
     ]  # fmt: skip
 
 
-def test_counts_are_a_table_of_pandas(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_counts_are_a_table_of_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
     car, bus = named(frames(GOES_EAST), "car"), named(numbered(frames(TURNS_BACK), 2), "bus")
     found = counts(joined(car, bus), WEST)
     pandas: Any = ModuleType("pandas")
