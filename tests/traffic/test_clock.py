@@ -330,6 +330,10 @@ class TestZone:
                 *("America/New_York", ("20260308_013000", "20260308_033000"), 7200),
                 ("2026-03-08 00:00:00-05:00", "2026-03-08 03:00:00-04:00"),  # there is no 02:00
             ),
+            (
+                *("Europe/Berlin", ("20261025_000500", "20261025_235500"), 86_400),
+                ("2026-10-25 00:00:00+02:00",),  # a day of 25 hours
+            ),
         ],
     )
     def test_intervals_begin_at_round_times_after_a_change_of_the_clock(
@@ -338,24 +342,6 @@ class TestZone:
         clocks = [clock_of(f"{name}.mp4", zone=zone) for name in names]
         periods = Intervals([(clock, [(0.0, 60.0)]) for clock in clocks], length).periods
         assert [str(period.start) for period in periods] == list(starts)
-
-    def test_a_day_with_a_change_of_the_clock_is_one_interval(self) -> None:
-        begin = clock_of("20261025_000500.mp4", zone=BERLIN)
-        (day,) = Intervals([(begin, [(0.0, 24.5 * 3600)])], 86_400).periods
-        assert (str(day.start), str(day.end)) == (
-            "2026-10-25 00:00:00+02:00", "2026-10-26 00:00:00+01:00",
-        )  # fmt: skip
-
-    def test_offsets_in_files_are_those_of_this_computer(self) -> None:
-        os.environ["TZ"] = "EST5EDT,M3.2.0,M11.1.0"
-        time.tzset()
-        texts = "2026-03-07 12:00-05:00", "2026-03-10 12:00-04:00"
-        saved = [SavedTracks({}, begin=parse_date_time(text)) for text in texts]
-        clocks = [find_clock(Path("a"), Settings(), saved=tracks) for tracks in saved]
-        periods = Intervals([(clock, [(0.0, 60.0)]) for clock in clocks], 86_400).periods
-        assert [str(period.start) for period in periods] == [
-            "2026-03-07 00:00:00-05:00", "2026-03-10 00:00:00-04:00",
-        ]  # fmt: skip
 
     @pytest.mark.parametrize("zone", ["Europe/Atlantis", "../etc/passwd", "", "Europe"])
     def test_an_unknown_one_is_refused(self, zone: str) -> None:
@@ -373,9 +359,3 @@ def test_a_text_that_is_not_a_time_is_refused(text: str) -> None:
 def test_a_text_that_is_not_a_pattern_is_refused(text: str) -> None:
     with pytest.raises(ValidationError, match=r"a pattern can only contain|need each other"):
         ClockSettings(pattern=text)
-
-
-def test_the_number_of_intervals_is_bounded() -> None:
-    message = "traffic.interval: 1 s makes more than 200,000 intervals; use a longer one"
-    with pytest.raises(ConfigError, match=message):
-        Intervals([(None, [(0.0, 10_000_000.0)])], 1)

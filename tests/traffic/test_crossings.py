@@ -11,8 +11,6 @@ from traffic.scenes import (
     ZONE,
     feet,
     frames,
-    joined,
-    numbered,
     settings_for,
     through,
 )
@@ -20,9 +18,7 @@ from vdet.polygons import Point
 from vdet.track.track import FrameTracks
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.crossings import (
-    Border,
     Line,
-    VehiclePath,
     crossings,
     lines_and_zones,
     link_tracks,
@@ -30,25 +26,6 @@ from vdet.traffic.crossings import (
 
 SETTINGS = settings_for(LINE, ZONE)
 DOWN = through((0, 600, 250), (5, 600, 550))  # in the zone at 0.83 s, on the line at 2.5 s
-
-
-def rounded(path: VehiclePath, border: Border) -> list[tuple[float, int, str, float | None]]:
-    """Return the crossings, with the number of the frame."""
-    return [
-        (round(e.time, 2), int(path.frames[e.row]), e.direction, e.seconds and round(e.seconds, 2))
-        for e in crossings(path, border)
-    ]
-
-
-def test_the_path_of_a_vehicle_has_the_rows_of_all_its_tracks() -> None:
-    old = frames(through((0, 600, 250), (2, 600, 370)), seconds=2)
-    new = numbered(frames(through((2.2, 600, 382), (5, 600, 550))), 7)
-    (path,) = link_tracks(joined(old, new), WIDTH, HEIGHT)
-    assert (path.vehicle, path.ids[0], path.ids[-1], path.seconds) == (1, 1, 7, 5)
-    assert path.points[[0, path.seen - 1]].tolist() == [[600, 250], [600, 550]]
-    line, zone = (item for (item,) in lines_and_zones(SETTINGS.traffic, WIDTH, HEIGHT))
-    assert rounded(path, line) == [(2.5, 63, "here", None)]
-    assert rounded(path, zone) == [(0.83, 21, "enter", None), (4.17, 105, "exit", 3.33)]
 
 
 def test_counts_in_the_middle_of_a_video_change_nothing() -> None:

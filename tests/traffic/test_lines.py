@@ -49,14 +49,9 @@ class TestFlicker:
         assert ways(events(feet(*rocking * 8, *onward))) == ["here"]
 
 
-class TestWayBack:
-    def test_a_u_turn_counts_both_ways(self) -> None:
-        path = through((0, 600, 300), (4, 600, 500), (8, 600, 300))
-        assert ways(events(frames(path))) == ["here", "away"]
-
-    def test_a_turn_on_a_wide_road_counts_both_ways_at_once(self) -> None:
-        path = through((0, 400, 380), (3, 400, 430), (6, 700, 430), (8, 700, 375))
-        assert ways(events(frames(path))) == ["here", "away"]
+def test_a_turn_on_a_wide_road_counts_both_ways_at_once() -> None:
+    path = through((0, 400, 380), (3, 400, 430), (6, 700, 430), (8, 700, 375))
+    assert ways(events(frames(path))) == ["here", "away"]
 
 
 class TestEnds:
@@ -74,12 +69,6 @@ class TestEnds:
 
     def test_a_line_in_a_small_frame_stays_a_line(self) -> None:
         assert events(feet((1, 1), (2, 2)), line((0, 0), (0, 8)), size=(128, 72)) == ()
-
-
-def test_a_jump_over_the_line_in_one_frame() -> None:
-    found = events(feet(*[(600.0, 300.0)] * 10, *[(600.0, 500.0)] * 10))
-    assert ways(found) == ["here"]
-    assert found[0].frame == 10
 
 
 @pytest.mark.parametrize("rate", [10, 25, 30, 60])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from traffic.passing import RATE, WIDTH, frame, passing, summarize, track
+from traffic.passing import RATE, WIDTH, frame, summarize, track
 from vdet.boxes import Box
 from vdet.track.track import FrameTracks
 from vdet.traffic.records import PATH_STEP, VehicleRecord, VehicleRecords
@@ -17,17 +17,6 @@ def records(*frames: FrameTracks) -> list[VehicleRecord]:
 def record(*frames: FrameTracks) -> VehicleRecord:
     (only,) = records(*frames)
     return only
-
-
-def test_a_vehicle_has_its_times_frames_and_path() -> None:
-    found = record(*passing(51))
-    assert (found.id, found.first, found.last) == (1, 0.0, 2.0)
-    assert found.seconds == pytest.approx(51 / RATE), "the last frame is shown too"
-    assert found.states == {"detected": 51}
-    assert found.path[0] == (30, 130)
-    assert found.path[-1] == (130, 130)
-    assert found.length == pytest.approx(100)
-    assert found.length_fraction == pytest.approx(100 / WIDTH)
 
 
 def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:

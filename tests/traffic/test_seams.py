@@ -64,21 +64,21 @@ def write_part(
     return path
 
 
-def write_halves(folder: File, names: Sequence[str], *paths: Path) -> list[File]:
+FOLLOWING = ["v_20260501_070000.jsonl", "v_20260501_070010.jsonl"]
+
+
+def write_halves(folder: File, path: Path) -> list[File]:
     """Write the tracks of 20 s into two files."""
-    starts = zip(names, (0, 10), strict=True)
-    return [write_part(folder / name, first, first + 10, *paths) for name, first in starts]
+    starts = zip(FOLLOWING, (0, 10), strict=True)
+    return [write_part(folder / name, first, first + 10, path) for name, first in starts]
 
 
 def count(files: Sequence[File]) -> list[Counts]:
     return list(count_files(files, SETTINGS).values())
 
 
-FOLLOWING = ["v_20260501_070000.jsonl", "v_20260501_070010.jsonl"]
-
-
 def test_a_vehicle_at_the_seam_is_one_flow(tmp_path: File) -> None:
-    videos = count(write_halves(tmp_path, FOLLOWING, GOES_EAST))
+    videos = count(write_halves(tmp_path, GOES_EAST))
     (row,) = flow_table(videos)
     assert (row.origin, row.destination, row.count) == ("west", "east", 1)
     assert [len(video.events) for video in videos] == [1, 1]
@@ -86,12 +86,12 @@ def test_a_vehicle_at_the_seam_is_one_flow(tmp_path: File) -> None:
 
 
 def test_a_vehicle_on_the_line_at_the_seam_counts_once(tmp_path: File) -> None:
-    first, second = count(write_halves(tmp_path, FOLLOWING, ON_THE_LINE))
+    first, second = count(write_halves(tmp_path, ON_THE_LINE))
     assert [event.name for event in (*first.events, *second.events)] == ["west"]
 
 
 def test_a_stay_goes_on_beyond_the_seam(tmp_path: File) -> None:
-    (row,) = zone_table(count(write_halves(tmp_path, FOLLOWING, STANDS)))
+    (row,) = zone_table(count(write_halves(tmp_path, STANDS)))
     assert (row.entered, row.left, row.max) == (1, 1, 1)
     assert row.max_stay == pytest.approx(16, abs=0.05)
 
@@ -159,13 +159,12 @@ def test_a_vehicle_counts_once_where_files_follow_one_another(name: str, tmp_pat
     assert flows_of(count(files)) == flows
 
 
-@pytest.mark.parametrize("names", [("a.jsonl", "b.jsonl"), FOLLOWING])
-def test_a_begin_is_that_of_the_first_of_several_files(
-    tmp_path: File, names: Sequence[str]
-) -> None:
-    settings = SETTINGS.model_copy(update={"input": InputSettings(begin="2026-01-02 03:04Z")})
-    files = write_halves(tmp_path, names, GOES_EAST)
-    clocks = [str(counts.clock) for counts in count_files(files, settings).values()]
+BEGINS = SETTINGS.model_copy(update={"input": InputSettings(begin="2026-01-02 03:04Z")})
+
+
+def test_a_begin_is_that_of_the_first_of_several_files(tmp_path: File) -> None:
+    files = write_halves(tmp_path, GOES_EAST)
+    clocks = [str(counts.clock) for counts in count_files(files, BEGINS).values()]
     assert clocks == [f"2026-01-02 03:04:{second}+00:00 (as given)" for second in ("00", "10")]
 
 
@@ -173,30 +172,15 @@ def test_a_begin_is_that_of_the_first_of_several_files(
     ("first", "second", "pattern"),
     [
         ("20260501_070000_000123NF", "20260501_070010_000124NR", None),
-        ("20260501_070000_NF", "20260501_070010_EF", None),
-        ("20260501_070000_PF", "20260501_070010_NF", None),
         (
             "RecM05_20260501_070000_070006_6D28808_1A468F9",
             "RecM05_20260501_070010_070016_6D28808_2C468F1",
             None,
         ),
-        (
-            "RecentClips/2026-05-01_07-00-00-front",
-            "SavedClips/2026-05-01_07-03-12/2026-05-01_07-00-10-front",
-            None,
-        ),
         ("2026-05-01/20260501_070000", "2026-05-02/20260501_070010", None),
         ("2026-05-01/07/cam/00.00", "2026-05-01/07/cam/00.10", "%Y-%m-%d/%H/cam/%M.%S"),
-        (
-            "2026-05-01/001/dav/07/07.00.00-07.00.10[M][0@0][0]",
-            "2026-05-01/001/dav/07/07.00.10-07.00.20[M][0@0][0]",
-            "%Y-%m-%d/001/dav/%H/%H.%M.%S",
-        ),
         ("1777618800.123456-ab12cd", "1777618810.654321-ef34", "in the file"),
-        ("a", "copy of b (1)", "in the file"),
         ("video", "video (1)", "in the file"),
-        ("part1", "part2", "in the file"),
-        ("cam1_9", "cam1_10", "in the file"),
         ("b", "a", "in the file"),
     ],
 )
@@ -205,11 +189,8 @@ def test_names_are_only_read_for_clocks(
 ) -> None:
     has_clock = pattern == "in the file"
     files = [
-        write_part(tmp_path / f"{name}.jsonl", start, start + 10, GOES_EAST, clock=clock)
-        for name, start, clock in (
-            (first, 0, 0 if has_clock else -1),
-            (second, 10, 10 if has_clock else -1),
-        )
+        write_part(path, start, start + 10, GOES_EAST, clock=start if has_clock else -1)
+        for path, start in ((tmp_path / f"{first}.jsonl", 0), (tmp_path / f"{second}.jsonl", 10))
     ]
     clock = ClockSettings(pattern=None if has_clock else pattern)
     camera = SETTINGS.camera.model_copy(update={"clock": clock})
@@ -230,8 +211,7 @@ def test_files_without_a_clock_are_in_the_order_of_their_numbers() -> None:
 def test_a_begin_chains_files_in_the_order_of_their_numbers(tmp_path: File) -> None:
     names = [f"clip{number}.jsonl" for number in range(1, 13)]
     files = [write_part(tmp_path / name, 2 * n, 2 * n + 2) for n, name in enumerate(names)]
-    settings = SETTINGS.model_copy(update={"input": InputSettings(begin="2026-01-02 03:04Z")})
-    videos = count_files(sorted(files), settings)
+    videos = count_files(sorted(files), BEGINS)
     begins = [(File(name).name, str(counts.clock)[17:19]) for name, counts in videos.items()]
     assert begins == [(name, f"{2 * n:02}") for n, name in enumerate(names)]
 

@@ -74,23 +74,12 @@ def test_times_show_their_offset_where_the_clock_changes(tmp_path: Path) -> None
 
 def morning() -> dict[str, Counts]:
     """An hour and ten minutes in two files: three vehicles cross the junction, one gets lost."""
-    bus = Estimate(
-        VehicleGroup(class_name="bus"),
-        0,
-        corrected=1,
-        true=1.2,
-        low=0.9,
-        high=2.7,
-        minutes_to_precision=9,
-    )
-    north = Estimate(
-        VehicleGroup("north", "in"),
-        1,
-        corrected=2,
-        true=2.2,
-        low=1.8,
-        high=3.4,
-        minutes_to_precision=9,
+    bus, north = (
+        Estimate(group, *numbers, minutes_to_precision=9)
+        for group, numbers in (
+            (VehicleGroup(class_name="bus"), (0, 1, 1.2, 0.9, 2.7)),
+            (VehicleGroup("north", "in"), (1, 2, 2.2, 1.8, 3.4)),
+        )
     )
     counted = (event(60, "north", "in", 1, "bus"), event(70, "south", "out", 1, "bus"))
     added = event(1000, "north", "in", 2, "truck")
