@@ -1,15 +1,6 @@
 """What a page consists of."""
 
-import re
-import shutil
-import subprocess
-from html import unescape
 from html.parser import HTMLParser
-from pathlib import Path
-
-import pytest
-
-needs_chromium = pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")
 
 VOID = {"meta", "img", "br", "wbr", "input"}
 
@@ -60,14 +51,3 @@ class Elements(HTMLParser):
             for name, value in attributes.items()
             if name in ("src", "href", "srcset", "data", "poster", "action") and value
         ]
-
-
-def title_in_chromium(page: Path) -> str:
-    """Return the title that a page has once its scripts have run."""
-    options = ("--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files")
-    command = ["chromium", *options, f"--user-data-dir={page.parent / 'profile'}", "--dump-dom"]
-    done = subprocess.run(
-        [*command, page.as_uri()], capture_output=True, text=True, check=True, timeout=60
-    )
-    title, *_ = re.findall("<title>(.*?)</title>", done.stdout, re.DOTALL)
-    return unescape(title)

@@ -1,13 +1,14 @@
 """The page over the videos of a batch."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from browser import browser
-from pages.html import Elements, needs_chromium, title_in_chromium
+from pages.html import Elements
 from vdet.pages.video import NO_STILL, Row, write_index
 
 NASTY = "</script><b>"
@@ -58,6 +59,13 @@ def index(folder: Path, videos: dict[str, dict[str, Any]], **failed: str) -> str
     return (folder / "index.html").read_text(encoding="utf-8")
 
 
+def table_of(html: str) -> dict[str, Any]:
+    """Return the table of vehicles of a page."""
+    (text,) = re.findall('id="vehicles">(.*?)</script>', html, re.DOTALL)
+    values: dict[str, Any] = json.loads(text)
+    return values
+
+
 def test_it_links_each_page_and_adds_up(tmp_path: Path) -> None:
     made = Elements(index(tmp_path, VIDEOS))
     links = {link["href"] for link in made.all("a")}
@@ -70,9 +78,7 @@ def test_it_links_each_page_and_adds_up(tmp_path: Path) -> None:
 
 
 def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
-    html = index(tmp_path, VIDEOS)
-    start = html.index(">", html.index('id="vehicles"')) + 1
-    assert json.loads(html[start : html.index("</script>", start)]) == {
+    assert table_of(index(tmp_path, VIDEOS)) == {
         "names": ["a", "day/b #1"],
         "pages": ["a.page/page.html", "day/b%20%231.page/page.html"],
         "plays": [True, True],
@@ -97,9 +103,7 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
 
 
 def test_columns_in_which_nothing_is_known_are_left_out(tmp_path: Path) -> None:
-    html = index(tmp_path, {"a": facts(row(1, "car", 0.0))})
-    start = html.index(">", html.index('id="vehicles"')) + 1
-    table = json.loads(html[start : html.index("</script>", start)])
+    table = table_of(index(tmp_path, {"a": facts(row(1, "car", 0.0))}))
     of_videos = {"names", "pages", "plays", "starts", "counts"}
     assert table.keys() - of_videos == {"class", "id", "first", "seconds"}
 
@@ -128,15 +132,15 @@ def test_a_narrow_screen_shows_the_first_row_whole_and_breaks_names_at_separator
         assert window.run(rows) == [values, True, True, "cam_<wbr>20261127_<wbr>174000"]
 
 
-@needs_chromium
 def test_back_from_a_page_the_table_is_filtered_as_it_was(tmp_path: Path) -> None:
     acts = """
 form.elements.class.value = "car"; // as the browser fills it in, after the scripts have run
 dispatchEvent(new PageTransitionEvent("pageshow"));
 const classes = [...body.rows].map(row => row.cells[2].textContent);
-const seen = [filter.firstElementChild.textContent, classes];
+return [filter.firstElementChild.textContent, classes];
 """
-    assert seen(index(tmp_path, VIDEOS), acts, tmp_path) == ["Filter (1)", ["car", "car"]]
+    index(tmp_path, VIDEOS)
+    assert after(acts, tmp_path) == ["Filter (1)", ["car", "car"]]
 
 
 @pytest.mark.parametrize("width", [1300, 400])
@@ -164,14 +168,13 @@ def test_of_no_video_it_says_so(tmp_path: Path) -> None:
     assert "No video was processed." in Elements(index(tmp_path, {})).text
 
 
-def seen(html: str, acts: str, folder: Path) -> Any:
-    """Return the value of `seen` after some acts in the page."""
-    acts = f"<script>{acts}document.title = JSON.stringify(seen);</script></body>"
-    (folder / "acts.html").write_text(html.replace("</body>", acts), encoding="utf-8")
-    return json.loads(title_in_chromium(folder / "acts.html"))
+def after(acts: str, folder: Path) -> Any:
+    """Return what acts in the page over the videos return."""
+    with browser(folder) as window:
+        window.visit(folder / "index.html")
+        return window.run(acts)
 
 
-@needs_chromium
 def test_its_table_is_filtered_and_sorted(tmp_path: Path) -> None:
     acts = """
 const shownRows = () => [...document.querySelectorAll("#found tbody tr")].map(
@@ -206,8 +209,10 @@ change("side", "left");
 change("size", "near");
 change("certainty", "sure");
 seen.beside = shownRows().map(row => row[5]);
+return seen;
 """
-    assert seen(index(tmp_path, VIDEOS), acts, tmp_path) == {
+    index(tmp_path, VIDEOS)
+    assert after(acts, tmp_path) == {
         "all": [
             ["", "#1", "car", "a", "page.html#t=0.000", "clip-1.mp4", "1.5", "52", "north → south",
              "-1", "18", "drove", "left", "near"],
@@ -227,14 +232,12 @@ seen.beside = shownRows().map(row => row[5]);
     }  # fmt: skip
 
 
-@needs_chromium
 def test_of_videos_without_vehicles_the_table_says_so(tmp_path: Path) -> None:
-    acts = 'const seen = document.getElementById("range").textContent;'
-    page = index(tmp_path, {"a": facts()})
-    assert seen(page, acts, tmp_path) == "No vehicle matches the filters."
+    index(tmp_path, {"a": facts()})
+    acts = "return document.getElementById('range').textContent"
+    assert after(acts, tmp_path) == "No vehicle matches the filters."
 
 
-@needs_chromium
 def test_it_is_printed_with_all_that_passes_the_filters_and_says_which(tmp_path: Path) -> None:
     acts = """
 const state = () => [body.children.length, document.getElementById("range").textContent,
@@ -247,11 +250,12 @@ dispatchEvent(new Event("beforeprint"));
 seen.paper = state();
 dispatchEvent(new Event("afterprint"));
 seen.after = state();
+return seen;
 """
     rows = [row(number, "car", number) for number in range(2500)]
     long = [{**item, "seconds": 3.0} for item in rows[:300]]
-    html = index(tmp_path, {"a": facts(*rows, *long)})
-    assert seen(html, acts, tmp_path) == {
+    index(tmp_path, {"a": facts(*rows, *long)})
+    assert after(acts, tmp_path) == {
         "screen": [100, "101–200 of 2,800", []],
         "paper": [2000, "1–2,000 of 2,500 (2,800 without filters)", ["Seconds  –"]],
         "after": [100, "1–100 of 2,500 (2,800 without filters)", ["Seconds  –"]],

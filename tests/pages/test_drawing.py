@@ -13,7 +13,6 @@ import pytest
 from benchmarks.pole_cameras import pole_scene
 
 from browser import CONTROL, DELETE, ENTER, ESCAPE, SHIFT, Browser, browser, downloaded
-from pages.html import Elements
 from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, counts, frames, settings_for, through
 from vdet.boxes import Box
 from vdet.config.loading import given_values, load_settings, parse_document
@@ -385,8 +384,3 @@ def test_drawn_scenes_have_the_same_counts_and_flows(window: Browser, tmp_path: 
     for line in scene.settings.traffic.lines:
         left, right = totals[line.name, "left"], totals[line.name, "right"]
         assert f"{line.name}left {left} · right {right}" in window.text("#list")
-
-
-def test_the_page_loads_nothing() -> None:
-    page = drawing(list(frames(*DOWN))).output(Path("page.html"), "gate.yaml").decode()
-    assert Elements(page).addresses() == []
