@@ -72,7 +72,7 @@ def test_what_is_found_of_a_class_that_is_left_out_is_no_false_alarm(
 def test_several_sets_a_table_and_a_page(
     run: Run, tmp_path: Path, red: tuple[str | Path, ...]
 ) -> None:
-    sets = [write_set(tmp_path / "one"), write_set(tmp_path / "two", "YOLO")]
+    sets = [write_set(tmp_path / "a_$x_{$ set"), write_set(tmp_path / "two", "YOLO")]
     folder = tmp_path / "page"
     options = ("--page", folder, "--set", "detector.search.probability=0.6")
     result = run("eval", "images", *sets, *red, *options, code=0)

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from boxing import moved_to
@@ -51,12 +50,8 @@ def test_results_do_not_depend_on_threads(red_set: LabelledImages, model: SvmMod
     alone = evaluate_images([red_set], model, COUNTING, progress=lambda *_: done.append)
     together = evaluate_images([red_set], model, COUNTING, threads=3)
     assert done == [1] * 6
-    images = [measured.images for (measured,) in (alone, together)]
-    for one, other, image in zip(*images, red_set.images, strict=True):
-        assert one.labelled is image is other.labelled
-        for frame, same in zip(one.every.frames, other.every.frames, strict=True):
-            assert np.array_equal(frame.track_boxes, same.track_boxes)
-            assert np.array_equal(frame.scores, same.scores)
+    assert alone[0].scores == together[0].scores
+    assert alone[0].scores.matches > 0
 
 
 def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledImages, model: SvmModel) -> None:

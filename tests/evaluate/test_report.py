@@ -20,8 +20,6 @@ from vdet.evaluate.results import (
     RunName,
     images_report,
     mistake_tiles,
-    score_files,
-    tracks_report,
     video_report,
     worst_tiles,
 )
@@ -50,18 +48,6 @@ class TestVideo:
         assert lines[8].split() == ["car", "2", "2", "0", "0.000", "0.000", "0.000", "bus", "2"]
         assert [value["named"] for value in report.values["classes"]] == [{"bus": 2}]
         assert "clip 1" in Elements(report.page()).text
-
-    def test_only_frames_that_the_truth_covers_are_compared(self, tmp_path: Path) -> None:
-        found, truth = tmp_path / "found.txt", tmp_path / "gt.txt"
-        found.write_text("".join(f"{n},1,1,1,100,100,1,-1,-1,-1\n" for n in range(1, 21)))
-        truth.write_text("".join(f"{n},1,1,1,100,100,1,3,1\n" for n in range(1, 11)))
-        covered = score_files(found, truth)
-        assert covered.scores.false_positives == 0
-        line = f"{found}: frames 1–10 compared"
-        report = tracks_report(covered, truth)
-        assert line in report.lines
-        assert line in report.page()
-        assert score_files(found, truth, until=15).scores.false_positives == 5
 
 
 class TestMistakesInVideo:
@@ -103,15 +89,6 @@ class TestPictures:
             MeasuredImage.of(picture, 100, shown, self.COUNTING) for picture in labelled.images
         ]
         return MeasuredSet(labelled, images)
-
-    def test_the_page_names_detector_source_and_labels_left_out(self, tmp_path: Path) -> None:
-        measured = self.measured(tmp_path / "a_$x_{$ set", self.CAR.box)
-        name = RunName("net", Path("x/my.onnx"), "net")
-        html = images_report([measured], self.COUNTING, name).page()
-        assert "detector net, model my.onnx, settings net" in html
-        assert "boxes from score 0.50" in html
-        assert "not vehicles in" in html
-        assert "cow (1)" in html
 
     def test_a_page_where_nothing_is_found_can_be_made(self, tmp_path: Path) -> None:
         report = images_report([self.measured(tmp_path)], self.COUNTING, NAME)

@@ -88,11 +88,6 @@ def test_predictions_that_count_beside_ignore_regions(
     assert [int(comparison.track_ids[t]) for f in comparison.frames for t in f.tracks] == kept
 
 
-def test_frames_with_nothing_that_counts_are_left_out() -> None:
-    comparison = compare(video([box(5, 300), box(6, 0, frame=4)]), video([region(250, 500)]))
-    assert [frame.number for frame in comparison.frames] == [4]
-
-
 GOOD = compare(video(drive(1, TEN)), video(drive(1, TEN)))
 POOR = compare(video(drive(1, range(5, 10))), video(drive(1, TEN)))
 
