@@ -1,6 +1,7 @@
 """Still pictures: which are taken, where their results go, and what is found in them."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -54,25 +55,21 @@ def placed(folder: Path, *names: str) -> dict[Path, Path]:
     return {folder / name: Path(name) for name in names}
 
 
-class TestPlan:
-    def test_one_picture_goes_to_the_file_named(self, tmp_path: Path) -> None:
-        source, out = tmp_path / "a.png", tmp_path / "found.jpg"
-        expected = ImageJob(source, (Output("image", out),), Path("a.png"))
-        assert plan_images(placed(tmp_path, "a.png"), out, None, OutputFiles()) == [expected]
-
-    def test_several_keep_their_names_in_the_folder(self, tmp_path: Path) -> None:
-        sources = placed(tmp_path, "a.png", "north/a.png")
-        jobs = plan_images(sources, tmp_path / "out", None, OutputFiles())
-        assert [job.outputs for job in jobs] == [
-            (Output("image", tmp_path / "out" / place),) for place in sources.values()
-        ]
-
-    def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
-        sources = placed(tmp_path, "a.png", "b.png")
-        jobs = plan_images(sources, None, tmp_path / "stages", OutputFiles())
-        assert [job.outputs for job in jobs] == [
-            (Output("stages", tmp_path / "stages" / name),) for name in "ab"
-        ]
+@pytest.mark.parametrize(
+    ("names", "out", "stages", "paths"),
+    [
+        (("a.png",), "found.jpg", None, ["image found.jpg"]),
+        (("a.png", "north/a.png"), "out", None, ["image out/a.png", "image out/north/a.png"]),
+        (("a.png", "b.png"), None, "stages", ["stages stages/a", "stages stages/b"]),
+    ],
+)
+def test_one_picture_goes_to_the_file_named_and_several_below_the_folder(
+    names: Sequence[str], out: str | None, stages: str | None, paths: Sequence[str]
+) -> None:
+    sources = placed(Path("in"), *names)
+    jobs = plan_images(sources, out and Path(out), stages and Path(stages), OutputFiles())
+    assert [job.source for job in jobs] == list(sources)
+    assert [f"{output.sink} {output.path}" for job in jobs for output in job.outputs] == paths
 
 
 def test_a_picture_that_is_too_small_is_named(tmp_path: Path) -> None:
@@ -132,15 +129,27 @@ class TestSeveral:
         assert [Path(item["image"]).name for item in items] == ["a.png", "c.png"]
         assert [len(item["boxes"]) for item in items] == [1, 1]
 
-    def test_a_shared_output_that_fails_at_the_end_leaves_nothing(
-        self, jobs: list[ImageJob], tmp_path: Path, register: Register
+    @pytest.mark.parametrize(
+        ("own", "shared"),
+        [(("image", "fails"), ()), (("fails", "image"), ()), (("image",), ("json", "fails"))],
+    )
+    def test_after_an_output_that_fails_at_the_end_none_appears(
+        self,
+        jobs: list[ImageJob],
+        tmp_path: Path,
+        register: Register,
+        own: Sequence[str],
+        shared: Sequence[str],
     ) -> None:
         register("fails", SinkKind(Fails))
-        shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
+        names = {"image": "out.png", "fails": "fails.txt", "json": "boxes.json"}
+        outputs = {sink: Output(sink, tmp_path / name) for sink, name in names.items()}
+        first = replace(jobs[0], outputs=tuple(outputs[sink] for sink in own))
+        given = [first, jobs[2]] if shared else [first]
+        search = ImageSearch(model_for(SETTINGS), SETTINGS)
+        results = run_images(given, [outputs[sink] for sink in shared], search, OutputFiles())
         with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-            list(
-                run_images(jobs, shared, ImageSearch(model_for(SETTINGS), SETTINGS), OutputFiles())
-            )
+            list(results)
         assert self.names(tmp_path) == []
 
     @pytest.mark.usefixtures("jobs")
@@ -164,17 +173,3 @@ class TestSeveral:
                 list(results)
             assert names(tmp_path / "out") == ["c.png"]
             assert not (tmp_path / "stages").exists()
-
-    def test_the_outputs_of_one_picture_appear_together_or_not_at_all(
-        self, jobs: list[ImageJob], tmp_path: Path, register: Register
-    ) -> None:
-        register("fails", SinkKind(Fails))
-        (first, *_) = jobs
-        fails = Output("fails", tmp_path / "fails.txt")
-        for outputs in ((*first.outputs, fails), (fails, *first.outputs)):
-            job = replace(first, outputs=outputs)
-            with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-                list(
-                    run_images([job], (), ImageSearch(model_for(SETTINGS), SETTINGS), OutputFiles())
-                )
-            assert self.names(tmp_path) == []
