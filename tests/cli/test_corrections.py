@@ -65,32 +65,17 @@ def test_corrections_are_truth_for_any_counts_of_the_video(run: Run, folder: Pat
 
 def test_several_videos_have_corrections_of_their_own(run: Run, folder: Path) -> None:
     paths = [folder / "a.jsonl", folder / "b.jsonl"]
+    car = {"id": 1, "y": 100, "width": 40, "height": 40, "score": 0.9, "state": "detected"}
     for path in paths:
         video = {"name": f"{path.stem}.mp4", "width": 320, "height": 240}
-        frames = [
-            {
-                "frame": n,
-                "time": n / 25,
-                "tracks": [
-                    {
-                        "id": 1,
-                        "x": 4 * n,
-                        "y": 100,
-                        "width": 40,
-                        "height": 40,
-                        "score": 0.9,
-                        "state": "detected",
-                    }
-                ],
-            }
-            for n in range(50)
-        ]
+        frames = [{"frame": n, "time": n / 25, "tracks": [car | {"x": 4 * n}]} for n in range(50)]
         path.write_text("\n".join(map(json.dumps, [{"video": video, **frames[0]}, *frames[1:]])))
     review, totals = folder / "b.yaml", folder / "totals.json"
     by_whom = "reviewer: Ann\nsaved: 2026-05-01 10:00:00Z\n"
     review.write_text(by_whom + HEAD.replace("red.mp4", "b.mp4") + MISSED)
     count = ("count", *paths, "-c", folder / "lines.yaml", "--corrections", review)
     result = run(*count, "--counts", totals, code=0)
+    assert "all files" in result.out
     assert result.out.endswith(
         f"{paths[1]}: corrected: 1 event, by b.yaml; minutes checked: 0.03 of 0.03; at checked "
         "lines 1 counted, 2 corrected, 2 estimated (95 %: 2 to 2)\n"

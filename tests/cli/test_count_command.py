@@ -304,21 +304,6 @@ def test_a_line_in_the_wrong_place_is_reported(
     assert result.err.count(note) == 1
 
 
-def test_several_files_are_counted_each_and_together(
-    run: Run, folder: Path, tmp_path: Path
-) -> None:
-    files = [write_tracks(tmp_path / f"{n}.csv", shift=30 * n) for n in (0, 1)]
-    out = tmp_path / "all.json"
-    result = run("count", *files, "-c", folder / "lines.yaml", "--counts", out, code=0)
-    assert "all files" in result.out
-    whole = json.loads(out.read_text())
-    assert list(whole["videos"]) == [str(file) for file in files]
-    assert whole["totals"][0] == {
-        "start": None, "end": None, "name": "gate", "direction": "out", "class": "vehicle",
-        "count": 2, "observed": 3.92, "part": False, "per_hour": None,
-    }  # fmt: skip
-
-
 def test_lines_in_fractions_are_counted_at_in_frames_of_a_given_size(
     run: Run, tmp_path: Path
 ) -> None:
@@ -326,26 +311,6 @@ def test_lines_in_fractions_are_counted_at_in_frames_of_a_given_size(
     lines.write_text("traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}")
     result = run("count", tracks, "-c", lines, "--size", "320x240", code=0)
     assert result.out.split()[6:9] == ["gate", "left", "1"]
-
-
-def test_each_video_of_a_batch_has_its_counts(
-    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
-) -> None:
-    clips = tmp_path / "clips" / "day"
-    clips.mkdir(parents=True)
-    for name in "ab":
-        (clips / f"{name}.mp4").write_bytes((folder / "red.mp4").read_bytes())
-    outputs = ("--counts", ".counts.csv", "--flows", ".flows.json")
-    wanted = ("--no-video", *outputs, "-c", folder / "lines.yaml")
-    out = tmp_path / "found"
-    run("detect-video", clips.parent, "-d", out, *red, *wanted, "--jobs", "1", code=0)
-    own = events_of(out / "day" / "a.counts.csv")
-    assert own == events_of(out / "day" / "b.counts.csv")
-    matrix = json.loads((out / "day" / "a.flows.json").read_text())["matrix"]
-    assert {origin: list(row.values()) for origin, row in matrix.items()} == {
-        "gate": [0, 1, 0],
-        "yard": [0, 0, 0],
-    }
 
 
 def test_the_manifest_of_a_batch_is_skipped(run: Run, tmp_path: Path) -> None:

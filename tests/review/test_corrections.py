@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from benchmarks.corrections import by_class, classified, damaged, review
-from benchmarks.pole_cameras import pole_scene
 
 from traffic.scenes import (
     HEIGHT,
@@ -294,18 +292,3 @@ def test_mistakes_have_a_position(tmp_path: Path) -> None:
     path.write_text(text.replace("bad", "false"))
     with pytest.raises(ConfigError, match="events: a has no direction x"):
         Corrections.read(path)
-
-
-def test_corrections_make_the_counts_of_a_drawn_camera_exact() -> None:
-    """Of its tracks 5 % are missing, 3 % doubled, and 10 % of another class."""
-    scene = pole_scene("two streams", 10.0, seed=1)
-    video = classified(scene, seed=5)
-    truth = count_frames(video, scene.settings, (WIDTH, HEIGHT))
-    counted = count_frames(damaged(video, seed=5), scene.settings, (WIDTH, HEIGHT))
-    corrections = review(truth, counted, scene.settings)
-    assert {event.errors for event in corrections.events} == {
-        (), ("missed",), ("false",), ("class",),
-    }  # fmt: skip
-    assert by_class(counted) != by_class(truth)
-    after = apply_corrections({"": counted}, [corrections], scene.settings)[""]
-    assert by_class(after) == by_class(truth)

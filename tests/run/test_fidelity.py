@@ -113,16 +113,6 @@ class TestFidelity:
         times = [Fraction(n, 25) + Fraction(n * n, 9000) for n in range(40)]
         return write_clip(tmp_path / "in.mp4", times=times, sounds=["aac"])
 
-    def test_times_are_kept_exactly(self, source: Path, tmp_path: Path) -> None:
-        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        run_red(Run(source, wanted))
-        times = [frame.time for frame in read(source)]
-        assert [frame.time for frame in read(tmp_path / "out.mp4")] == times
-        records = (tmp_path / "out.jsonl").read_text().splitlines()
-        assert [json.loads(line)["time"] for line in records] == [
-            round(float(time), 6) for time in times
-        ]
-
     def test_a_part_has_the_sound_of_that_part(self, source: Path, tmp_path: Path) -> None:
         begin, end = [frame.time for frame in read(source)][10:30:19]
         run_red(Run(source, outputs(video=tmp_path / "out.mp4"), start=begin, end=end))

@@ -13,7 +13,6 @@ from vdet.boxes import Box
 from vdet.config.scene import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.pages.render import PAGE_NAME
 from vdet.run.sinks import Output
 from vdet.run.video import Run
 
@@ -77,13 +76,3 @@ def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -
 def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no lines or zones to count at"):
         write(Output("counts", tmp_path / "c.csv"), [result_of(Box.sized(1, 1, 9, 9))])
-
-
-def test_a_page_shows_the_counts(red_clip: Path, tmp_path: Path) -> None:
-    totals = run_red(Run(red_clip, outputs(page=tmp_path / "page")), with_counts())
-    assert totals.summaries[tmp_path / "page"]["counts"] == {
-        "gate: out": 1,
-        "yard: enter": 1,
-        "yard: vanish": 1,
-    }
-    assert "gate: out" in (tmp_path / "page" / PAGE_NAME).read_text()
