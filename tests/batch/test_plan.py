@@ -18,6 +18,7 @@ from vdet.run.video import Run
 COMMON = Run(Path(), frames=7)
 VIDEO: dict[str, str | None] = {"video": None}
 TRACKS: dict[str, str | None] = {"tracks": ".csv"}
+FOLDERS: dict[str, str | None] = {"stages": ".stages"}
 
 
 @pytest.fixture(autouse=True)
@@ -141,9 +142,9 @@ class TestJobs:
     )
     def test_what_is_empty_or_out_of_date_is_done_again(self, change: Callable[[], object]) -> None:
         record("clips/a.mp4", "out/a.csv")
-        assert self.tracks_alone().skipped
+        assert plan("clips/a.mp4", suffixes=TRACKS, skip_existing=True).skipped
         change()
-        (job,) = self.tracks_alone().runs
+        (job,) = plan("clips/a.mp4", suffixes=TRACKS, skip_existing=True).runs
         assert job.overwrite == Path("out/a.csv").exists()
 
     @pytest.mark.parametrize(
@@ -160,10 +161,7 @@ class TestJobs:
         change()
         os.utime("clips/a.mp4", (0, 0))
         with pytest.raises(BatchError, match=r"^out/a\.csv: has changed since vdet wrote it"):
-            self.tracks_alone()
-
-    def tracks_alone(self) -> Plan:
-        return plan("clips/a.mp4", suffixes=TRACKS, skip_existing=True)
+            plan("clips/a.mp4", suffixes=TRACKS, skip_existing=True)
 
     def test_names_that_are_no_utf_8_are_up_to_date_too(self) -> None:
         Path("clips/a.mp4").rename("clips/\udcff.mp4")
@@ -173,27 +171,24 @@ class TestJobs:
 
 @pytest.mark.usefixtures("clips")
 class TestRefused:
-    def test_two_inputs_of_one_name(self) -> None:
-        words = r"^clips/a\.mp4 and clips/day/a\.mp4: both would be written to out/a\.mp4"
+    @pytest.mark.parametrize(
+        ("inputs", "folder", "words"),
+        [
+            ("clips/a.mp4 clips/day/a.mp4", "out", "^clips/a.mp4 and clips/day/a.mp4: both would"),
+            ("clips/day/a.mp4", "clips/day", "^clips/day/a.mp4: is inside the output folder"),
+            *(("clips", folder, "is inside the input") for folder in ("clips", "clips/day")),
+            ("clips", ".", "is inside the output folder"),
+        ],
+    )
+    def test_names_that_clash(self, inputs: str, folder: str, words: str) -> None:
         with pytest.raises(BatchError, match=words):
-            plan("clips/a.mp4", "clips/day/a.mp4")
+            plan(*inputs.split(), folder=folder)
 
     def test_tracks_that_would_be_the_manifest(self) -> None:
         Path("clips/a.mp4").rename("clips/manifest.mp4")
         assert len(plan("clips").runs) == 4
         with pytest.raises(BatchError, match=r"^the manifest and clips/manifest\.mp4: both would"):
             plan("clips", suffixes=VIDEO | {"tracks": ".jsonl"})
-
-    @pytest.mark.parametrize("folder", ["clips", "clips/out", "clips/day", "."])
-    def test_inputs_and_outputs_in_one_another(self, folder: str) -> None:
-        with pytest.raises(BatchError, match=r"is inside the (input|output folder)"):
-            plan("clips", folder=folder)
-
-    def test_outputs_that_are_inputs_by_name(self) -> None:
-        Path("clips/found").mkdir()
-        Path("clips/found/a.mp4").touch()
-        with pytest.raises(BatchError, match=r"^clips/found/a.mp4: is inside the output folder"):
-            plan("clips/found/a.mp4", folder="clips/found")
 
     def test_an_output_that_is_an_input(self) -> None:
         Path("out").mkdir()
@@ -241,14 +236,6 @@ class TestTotals:
 class TestFolders:
     """An output may be a folder: that of each video has its name too."""
 
-    def plan(self, *, overwrite: bool = False, skip_existing: bool = False) -> Plan:
-        return plan(
-            "clips/a.mp4",
-            suffixes={"stages": ".stages"},
-            overwrite=overwrite,
-            skip_existing=skip_existing,
-        )
-
     def record(self) -> None:
         """Write the pictures of a.mp4 and what the manifest says about them."""
         folder = Path("out/a.stages")
@@ -259,21 +246,21 @@ class TestFolders:
 
     def test_one_that_is_there_is_refused_or_replaced_unless_it_is_empty(self) -> None:
         Path("out/a.stages").mkdir(parents=True)
-        assert self.plan().runs
+        assert plan("clips/a.mp4", suffixes=FOLDERS).runs
         self.record()
         with pytest.raises(OutputError, match=r"out/a\.stages/1-boxes\.png: already exists"):
-            self.plan()
-        assert self.plan(overwrite=True).runs
+            plan("clips/a.mp4", suffixes=FOLDERS)
+        assert plan("clips/a.mp4", suffixes=FOLDERS, overwrite=True).runs
 
     def test_one_is_skipped_kept_or_made_again_by_what_the_sink_writes(self) -> None:
         self.record()
         Path("out/a.stages/notes.txt").write_text("mine")
-        assert self.plan(skip_existing=True).skipped
+        assert plan("clips/a.mp4", suffixes=FOLDERS, skip_existing=True).skipped
         Path("out/a.stages/3-boxes.png").write_bytes(b"picture")
         with pytest.raises(BatchError, match=r"out/a\.stages: has changed since vdet wrote it"):
-            self.plan(skip_existing=True)
+            plan("clips/a.mp4", suffixes=FOLDERS, skip_existing=True)
         Path("out/a.stages").rename("elsewhere")
-        assert not self.plan(skip_existing=True).runs[0].overwrite
+        assert not plan("clips/a.mp4", suffixes=FOLDERS, skip_existing=True).runs[0].overwrite
 
 
 @pytest.fixture
@@ -297,22 +284,25 @@ def found(*clips: str) -> list[tuple[str, str]]:
     return [(str(source.path), str(source.relative_path)) for source in sources]
 
 
+VIDEOS = ["a.MOV", "b.mp4", "day1/c.avi", "day1/evening/d.ts", "day2/c.avi"]
+
+
 @pytest.mark.usefixtures("folder")
 class TestFound:
-    def test_a_file_is_taken_whatever_its_suffix(self) -> None:
-        assert found("clips/day1/c.avi", "camera.raw") == [
-            ("clips/day1/c.avi", "c.avi"),
-            ("camera.raw", "camera.raw"),
-        ]
-
-    def test_a_folder_gives_the_videos_in_it_and_below_but_no_hidden_or_drawn_ones(self) -> None:
-        assert found("clips") == [
-            ("clips/a.MOV", "a.MOV"),
-            ("clips/b.mp4", "b.mp4"),
-            ("clips/day1/c.avi", "day1/c.avi"),
-            ("clips/day1/evening/d.ts", "day1/evening/d.ts"),
-            ("clips/day2/c.avi", "day2/c.avi"),
-        ]
+    @pytest.mark.parametrize(
+        ("clips", "expected"),
+        [
+            (["clips/day1/c.avi", "camera.raw"], ["c.avi", "camera.raw"]),  # whatever the suffix
+            (["clips"], VIDEOS),  # no hidden or drawn ones
+            (["clips", "clips/b.mp4", "link/b.mp4", "clips/../clips"], VIDEOS),  # once
+            (["odd [1].mp4"], ["odd [1].mp4"]),  # no pattern
+        ],
+    )
+    def test_a_file_is_taken_and_the_videos_in_a_folder_and_below(
+        self, clips: list[str], expected: list[str]
+    ) -> None:
+        Path("link").symlink_to("clips")
+        assert [place for _, place in found(*clips)] == expected
 
     def test_clips_that_vdet_cut_are_taken_by_name_only(self) -> None:
         for folder in ("mine", "theirs"):
@@ -324,13 +314,6 @@ class TestFound:
         assert found("theirs", f"mine/{name}") == taken
         with pytest.raises(BatchError, match="mine: no video found"):
             found("mine")
-
-    def test_a_file_whose_name_looks_like_a_pattern_is_itself(self) -> None:
-        assert found("odd [1].mp4") == [("odd [1].mp4", "odd [1].mp4")]
-
-    def test_a_video_that_is_named_twice_is_taken_once(self, folder: Path) -> None:
-        (folder / "link").symlink_to(folder / "clips")
-        assert found("clips", "clips/b.mp4", "link/b.mp4", "clips/../clips") == found("clips")
 
 
 def pictures(folder: Path, *numbers: int) -> Path:
