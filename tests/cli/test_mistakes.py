@@ -116,11 +116,9 @@ REFUSED = {
         "--interval: 7min does not divide a day;"
     ),
     "detect-video in.mp4 --no-video --tracks x.csv --class plane": (
-        "--class: plane: unknown class; known: car, "
+        "--class: plane: unknown class; known: car, truck, bus, motorcycle, bicycle, vehicle; det"
     ),
-    "detect-video in.mp4 --no-video --tracks x.csv --begin foo": (
-        "--begin: 'foo' is not a time; expected one such"
-    ),
+    "detect-video in.mp4 --no-video --tracks x.csv -c svm --class car": "--class: has no effect",
     "detect-video in.mp4 --no-video --tracks x.csv --model caf\udce9/net.onnx": (
         "--model: must be UTF-8; rename the file or folder, or use a relative path (got 'caf"
     ),

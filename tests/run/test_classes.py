@@ -2,17 +2,13 @@
 
 from pathlib import Path
 
-import pytest
-
 from boxing import moved_to
 from red_cars import CAR, NullDetector, car_at
 from run.red_runs import outputs
 from running import names, rows_of
 from vdet.boxes import Boxes
-from vdet.config.loading import load_settings
 from vdet.config.scene import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.errors import ConfigError
 from vdet.media import Picture
 from vdet.run.loop import Parts
 from vdet.run.video import Run, run_video
@@ -47,20 +43,3 @@ def test_a_vehicle_is_boxed_and_listed_by_the_class_that_it_gets_within_two_seco
     assert (event["id"], event["class"], float(event["time"]) < 1.7) == ("1", "truck", True)
     (crop,) = names(tmp_path / "crops")
     assert crop.startswith("vehicle-0001-truck-at-")
-
-
-@pytest.mark.parametrize(
-    ("assignments", "words"),
-    [
-        (
-            ["detector.classes=[car, bus]", "classes=[tram]"],
-            "classes: tram: unknown class; known: car, bus; detector.classes can have more",
-        ),
-        (["detector.kind=svm", "classes=[car]"], "classes: has no effect"),
-    ],
-)
-def test_a_class_that_nothing_looks_for_is_refused(assignments: list[str], words: str) -> None:
-    with pytest.raises(ConfigError, match=words):
-        load_settings([], assignments)
-    known = ["detector.classes=[car, tram]", "classes=[tram]"]
-    assert load_settings([], known).classes == ("tram",)

@@ -52,18 +52,6 @@ def test_facts_of_a_step_are_json_and_replace_nothing(red_clip: Path, tmp_path: 
 
 
 class TestFollowFrames:
-    @pytest.mark.parametrize(
-        ("settings", "minimum"), [(SETTINGS, 0.3), (PERSPECTIVE, 0.5)], ids=["original", "default"]
-    )
-    def test_follows_a_car_by_one_id(self, settings: Settings, minimum: float) -> None:
-        results = list(follow(drive(20), settings))
-        shown = [result for result in results if result.tracks]
-        assert len(shown) > 15
-        for result in shown:
-            (track,) = result.tracks
-            assert track.id == 1
-            assert track.box.iou(car_at(result.frame.index)) > minimum
-
     @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
     @pytest.mark.parametrize("threads", [3, 5])
     def test_gives_the_same_with_any_number_of_threads(

@@ -95,13 +95,6 @@ class TestMapOrdered:
             pairs = list(pool.map_ordered(odd_ones_end_first, range(10)))
             assert pairs == [(item, item**2) for item in range(10)]
 
-    def test_few_items_are_taken_ahead(self) -> None:
-        seen: list[int] = []
-        with SearchThreads(2) as pool:
-            pairs = pool.map_ordered(str, recording(range(1, 100), seen))
-            assert next(pairs) == (1, "1")
-        assert len(seen) == 3
-
 
 class TestAllTogether:
     """As in the pipeline: reading, searching and writing overlap."""

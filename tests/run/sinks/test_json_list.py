@@ -1,7 +1,6 @@
 """The list of boxes of still pictures."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,8 @@ from vdet.media import Picture
 from vdet.run.sinks import Output
 from vdet.track.track import Track
 
+BOX = Box.sized(1, 2, 3, 4)
+FINDER = RoadFinder(None, LaneSettings(), 320, 240)
 ITEMS = (
     {
         "image": "a.png",
@@ -23,8 +24,11 @@ ITEMS = (
         "height": 240,
         "boxes": [
             {"x": 1, "y": 2, "width": 3, "height": 4, "score": 0.5679, "class": "car"}
-            | {"foot": [2.5, 6.0], "distance": None, "lane": None}
+            | {"foot": [2.5, 6.0], "distance": 23.46, "lane": -1},
+            {"x": 1, "y": 2, "width": 3, "height": 4, "score": 0.5, "class": None}
+            | {"foot": [2.5, 6.0], "distance": None, "lane": None},
         ],
+        "lane": None,
     },
     {"image": str(Path("in") / "b.png"), "width": 64, "height": 48, "boxes": []},
 )
@@ -32,9 +36,11 @@ ITEMS = (
 
 RESULTS = (
     result_of(
-        Track(1, Box.sized(1, 2, 3, 4), 0.567891, "detected", "car"),
+        Track(1, BOX, 0.567891, "detected", "car", distance=23.4567, lane=-1),
+        Track(2, BOX, 0.5, "detected"),
         source=Path("a.png"),
         image=road(),
+        found=FINDER.update(FINDER.observe(Picture(road()))),
     ),
     result_of(source=Path("in") / "b.png", image=road()[:48, :64]),
 )
@@ -53,15 +59,3 @@ def test_there_is_an_item_a_picture_with_a_list_of_boxes(
         write(Output("json", target), RESULTS, video=None)
     assert read(path.read_text(encoding="utf-8")) == list(ITEMS)
     assert read(capsys.readouterr().out) == list(ITEMS)
-
-
-def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
-    path = tmp_path / "boxes.json"
-    finder = RoadFinder(None, LaneSettings(), 320, 240)
-    bare = finder.update(finder.observe(Picture(road())))
-    near = Track(1, Box.sized(1, 2, 3, 4), 0.5, state="detected", distance=23.4567, lane=-1)
-    vehicles = (near, replace(near, distance=None, lane=None))
-    write(Output("json", path), [result_of(*vehicles, found=bare)], video=None)
-    [item] = read(path.read_text(encoding="utf-8"))
-    assert item["lane"] is None
-    assert [(box["distance"], box["lane"]) for box in item["boxes"]] == [(23.46, -1), (None, None)]
