@@ -354,3 +354,9 @@ def test_a_text_that_is_not_a_time_is_refused(text: str) -> None:
 def test_a_text_that_is_not_a_pattern_is_refused(text: str) -> None:
     with pytest.raises(ValidationError, match=r"a pattern can only contain|need each other"):
         ClockSettings(pattern=text)
+
+
+def test_the_number_of_intervals_is_bounded() -> None:
+    message = "traffic.interval: 1 s makes more than 200,000 intervals; use a longer one"
+    with pytest.raises(ConfigError, match=message):
+        Intervals([(None, [(0.0, 10_000_000.0)])], 1)
