@@ -13,9 +13,9 @@ from vdet.synthetic import Scene, write_truth
 
 @pytest.fixture
 def truth_path(scene: Scene, tmp_path: Path) -> Path:
-    """The true boxes of the first eight frames of `clip_path`."""
+    """The true boxes of the first nine frames of `clip_path`."""
     path = tmp_path / "gt.txt"
-    write_truth(path, replace(scene, frames=8))
+    write_truth(path, replace(scene, frames=9))
     return path
 
 

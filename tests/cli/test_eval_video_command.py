@@ -13,7 +13,7 @@ def test_scores_agree_with_those_of_the_tracks_written(
 ) -> None:
     tracks, folder = tmp_path / "found.jsonl", tmp_path / "page"
     common = ("--model", model_path, *QUICK_OPTIONS)
-    made = ("--no-video", "--tracks", tracks, "--frames", "8")
+    made = ("--no-video", "--tracks", tracks, "--frames", "9")
     run("detect-video", clip_path, *made, *common, code=0)
     options = ("--truth", truth_path, "--json", "-", "--page", folder)
     from_video = run("eval", "video", clip_path, *options, *common, code=0)

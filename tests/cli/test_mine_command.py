@@ -3,7 +3,6 @@
 import re
 import zipfile
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -17,7 +16,6 @@ from vdet.labels.label import boxes_of
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.patches import find_patches, read_patches
 from vdet.media.reader import VideoReader
-from vdet.synthetic import Scene, write_truth
 
 SETS = ", ".join(
     f"{{size: {size}, overlap: 0.875, top: {top}, bottom: {bottom}}}"
@@ -28,13 +26,6 @@ WINDOWS = (
     *("--set", f"detector.search.windows=[{SETS}]"),
 )
 NAME = re.compile(r"frame(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
-
-
-@pytest.fixture(scope="module")
-def truth_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("truth") / "gt.txt"
-    write_truth(path, replace(scene, frames=9))
-    return path
 
 
 @pytest.fixture

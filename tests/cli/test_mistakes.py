@@ -68,6 +68,7 @@ WRONG_USAGE = {
     "mine in.mp4 --truth gt.txt -o m.zip --until 3 --from 4": "--until must not be before --from",
     "mine in.mp4 --truth gt.txt -o m.zip --every 0": "--every",
     "mine in.mp4 --truth a.txt --truth b.txt -o m.zip": "(videos: 1, truths: 2)",
+    "review in.mp4 --tracks-from t.csv -o page": "no lines or zones to review",
     "train-net -o a.onnx": "nothing to learn from; pass DATA or --video",
 }
 REFUSED = {

@@ -10,7 +10,17 @@ from benchmarks.pole_cameras import HEIGHT as POLE_HEIGHT
 from benchmarks.pole_cameras import WIDTH as POLE_WIDTH
 from benchmarks.pole_cameras import pole_scene
 
-from review.test_corrections import corrected, counts, error, events_of, missed, saved, ways
+from review.test_corrections import (
+    BORDERS,
+    ZONES,
+    corrected,
+    counts,
+    error,
+    events_of,
+    missed,
+    saved,
+    ways,
+)
 from vdet.errors import ConfigError
 from vdet.review.corrections import apply_corrections
 from vdet.traffic.counting import count_frames
@@ -109,13 +119,7 @@ def test_errors_where_nobody_checked_change_counts_but_not_the_estimate(tmp_path
     before = counts()
     listed = [error(event, None) for event in events_of(before, "line")]
     false = [error(event, "false") for event in events_of(before, "zone")]
-    path = saved(
-        tmp_path / "c.yaml",
-        *listed,
-        *false,
-        checked=spans("line"),
-        zones=[{"name": "zone", "points": [[400, 300], [800, 300], [800, 500], [400, 500]]}],
-    )
+    path = saved(tmp_path / "c.yaml", *listed, *false, checked=spans("line"), zones=ZONES)
     after = corrected(before, path)
     assert not events_of(after, "zone")
     assert estimate_of(after, ALL) == (2, 2, 2, 2)
@@ -126,11 +130,10 @@ def test_both_ends_of_a_visit_to_a_zone_are_false_and_occupancy_is_empty_if_unba
 ) -> None:
     before = counts()
     enter, leave = events_of(before, "zone")
-    zones = [{"name": "zone", "points": [[400, 300], [800, 300], [800, 500], [400, 500]]}]
-    path = saved(tmp_path / "c.yaml", error(enter, "false"), zones=zones)
+    path = saved(tmp_path / "c.yaml", error(enter, "false"), zones=ZONES)
     after = corrected(before, path)
     assert not events_of(after, "zone")
-    turned = saved(path, error(enter, "direction", "exit"), zones=zones)
+    turned = saved(path, error(enter, "direction", "exit"), zones=ZONES)
     unbalanced = corrected(before, turned)
     [row] = unbalanced.zone_use()
     assert (row.entered, row.left, (row.mean, row.max)) == (0, 2, (None, None))
@@ -165,15 +168,12 @@ def test_files_for_some_of_the_lines_give_one_result_in_either_order(tmp_path: P
         sample={"seed": 1, "spans": [3, 0]},
         **values,
     )
-    lines = [
-        {"name": "line", "start": [200, 400], "end": [1000, 400], "left": "away", "right": "here"}
-    ]
     b = saved(
         tmp_path / "b.yaml",
         missed(15),
         checked=spans("line", start=10.0, end=20.0),
         sample={"seed": 1, "spans": [3, 1]},
-        lines=lines,
+        lines=BORDERS[:1],
         **values,
     )
     run = replace(before, spans=((0.0, 100.0),))
@@ -182,9 +182,8 @@ def test_files_for_some_of_the_lines_give_one_result_in_either_order(tmp_path: P
     assert one.corrected
     assert other.corrected
     assert one.corrected.checked == other.corrected.checked == ((0.0, 10.0),)
-    c = saved(
-        tmp_path / "c.yaml", error(first[0], None), missed(9), checked=spans("line"), lines=lines
-    )
+    events = error(first[0], None), missed(9)
+    c = saved(tmp_path / "c.yaml", *events, checked=spans("line"), lines=BORDERS[:1])
     with pytest.raises(ConfigError, match="contradict each other: line, "):
         corrected(run, a, c)
 

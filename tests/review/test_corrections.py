@@ -34,6 +34,7 @@ BORDERS = [
     {"name": one.name, "start": [*one.start], "end": [*one.end], "left": "away", "right": "here"}
     for one in (LINE, SECOND)
 ]
+ZONES = [{"name": "zone", "points": [[*point] for point in ZONE.points]}]
 
 
 def counts() -> Counts:

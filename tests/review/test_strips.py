@@ -54,12 +54,8 @@ traffic:
 def test_coarse_pages_have_no_readable_faces_or_plates(tmp_path: Path, run: Run) -> None:
     large = GATE.replace("start: [20, 120], end: [300, 120]", "start: [60, 120], end: [100, 120]")
     road = draw_road(tmp_path, CARS[:1], seconds=9, settings=large)
-    fine, coarse = tmp_path / "fine", tmp_path / "coarse"
-    for folder in (fine, coarse):
-        saved = ("--tracks-from", road.tracks, "-c", road.settings)
-        setting = () if folder == fine else ("--set", "output.coarse=true")
-        run("review", road.video, *saved, *setting, "-o", folder, code=0)
-    pages = [read_page(folder / "review.html") for folder in (fine, coarse)]
+    coarse = ("--set", "output.coarse=true", "--overwrite")
+    pages = [read_page(write_review(run, tmp_path, road, *options)) for options in ((), coarse)]
     before, after = (page.pictures[0].shape[1] for page in pages)
     columns = pages[0].data["pictures"][0]["columns"]
     assert before == 200 * columns, "40 pixels of the frame, 24 of which are the car"
@@ -73,29 +69,12 @@ def test_a_missed_vehicle_is_a_streak_without_a_mark(tmp_path: Path, run: Run) -
     assert [mark["id"] for mark in page.data["marks"] if mark["seconds"] < 60] == [1, 2]
 
 
-def test_a_review_needs_a_line(tmp_path: Path, run: Run) -> None:
-    road = draw_road(tmp_path, CARS[:1], seconds=2)
-    output = tmp_path / "review"
-    ended = run("review", road.video, "--tracks-from", road.tracks, "-o", output, code=2)
-    assert "no lines or zones to review" in ended.err
-    assert not output.exists()
-
-
 def test_the_live_review_equals_that_of_saved_tracks(tmp_path: Path, run: Run) -> None:
     road = draw_road(tmp_path, CARS[:2], seconds=9)
     shared = ["-c", road.settings]
     tracks, live, later = (tmp_path / name for name in ("tracks.jsonl", "live", "later"))
-    run(
-        "detect-video",
-        road.video,
-        "--no-video",
-        *shared,
-        "--tracks",
-        tracks,
-        "--review",
-        live,
-        code=0,
-    )
+    outputs = ("--no-video", "--tracks", tracks, "--review", live)
+    run("detect-video", road.video, *shared, *outputs, code=0)
     run("review", road.video, "--tracks-from", tracks, *shared, "-o", later, code=0)
     pages = [read_page(folder / "review.html") for folder in (live, later)]
     assert pages[0].data["marks"] == pages[1].data["marks"]

@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from clips import sound_of, write_clip
 from red_cars import HEIGHT, SETTINGS, WIDTH, drive
 from run.red_runs import outputs, read, run_red, video_info
-from vdet.config.schema import DrawSettings, OutputSettings, Settings
+from vdet.config.schema import OutputSettings
 from vdet.media import ColorTags, Picture
 from vdet.media.frame import UNSPECIFIED, Coding, Planes
 from vdet.media.writer import VideoWriter
@@ -50,10 +49,6 @@ def filmed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return path
 
 
-def written_with(settings: OutputSettings, **draw: Any) -> Settings:
-    return SETTINGS.model_copy(update={"output": settings, "draw": DrawSettings(**draw)})
-
-
 def planes_of(path: Path) -> list[Planes]:
     """Return what the decoder gives."""
     found = [frame.picture.planes for frame in read(path)]
@@ -77,48 +72,33 @@ def untouched(track_file: Path) -> list[NDArray[np.bool_]]:
     return masks
 
 
-def doubled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell it by pixel."""
-    return mask.repeat(2, axis=0).repeat(2, axis=1)
+def test_without_loss_in_the_encoder_pixels_not_drawn_on_are_those_of_the_source(
+    filmed: Path, tmp_path: Path
+) -> None:
+    """Far from boxes and labels, and inside boxes: luma and chroma are equal, bit for bit."""
+    wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
+    lossless = OutputSettings(preset="ultrafast", crf=0)
+    run_red(Run(filmed, wanted), SETTINGS.model_copy(update={"output": lossless}))
+    pairs = zip(planes_of(filmed), planes_of(tmp_path / "out.mp4"), strict=True)
+    drawn = 0
+    for mask, (before, after) in zip(untouched(tmp_path / "out.jsonl"), pairs, strict=True):
+        changed = after.luma != before.luma
+        assert not (changed & mask.repeat(2, axis=0).repeat(2, axis=1)).any()
+        for old, new in ((before.blue, after.blue), (before.red, after.red)):
+            assert not ((new != old) & mask).any()
+        if not mask.all():
+            assert changed.any()
+            drawn += 1
+    assert drawn > FRAMES // 2, "there are boxes"
 
 
-class TestPixels:
-    """What is not drawn on is changed by the encoder alone."""
-
-    def test_without_loss_in_the_encoder_they_are_those_of_the_source(
-        self, filmed: Path, tmp_path: Path
-    ) -> None:
-        """Far from boxes and labels, and inside boxes: luma and chroma are equal, bit for bit."""
-        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        settings = written_with(OutputSettings(preset="ultrafast", crf=0))
-        run_red(Run(filmed, wanted), settings)
-        masks = untouched(tmp_path / "out.jsonl")
-        drawn = 0
-        pairs = zip(planes_of(filmed), planes_of(tmp_path / "out.mp4"), strict=True)
-        for mask, (before, after) in zip(masks, pairs, strict=True):
-            changed = after.luma != before.luma
-            assert not (changed & doubled(mask)).any()
-            for old, new in ((before.blue, after.blue), (before.red, after.red)):
-                assert not ((new != old) & mask).any()
-            if not mask.all():
-                assert changed.any()
-                drawn += 1
-        assert drawn > FRAMES // 2, "there are boxes"
-
-
-class TestFidelity:
-    @pytest.fixture
-    def source(self, tmp_path: Path) -> Path:
-        """A clip whose rate varies, with a tone."""
-        times = [Fraction(n, 25) + Fraction(n * n, 9000) for n in range(40)]
-        return write_clip(tmp_path / "in.mp4", times=times, sounds=["aac"])
-
-    def test_a_part_has_the_sound_of_that_part(self, source: Path, tmp_path: Path) -> None:
-        begin, end = [frame.time for frame in read(source)][10:30:19]
-        run_red(Run(source, outputs(video=tmp_path / "out.mp4"), start=begin, end=end))
-        after = sound_of(tmp_path / "out.mp4")
-        assert len(after) == pytest.approx(float(end - begin) * TONE_RATE / 1024, abs=2)
-        times = {data: time - float(begin) for time, data in sound_of(source)}
-        assert [time for time, _ in after] == pytest.approx(
-            [times[data] for _, data in after], abs=0.001
-        )
+def test_a_part_has_the_sound_of_that_part(tmp_path: Path) -> None:
+    times = [Fraction(n, 25) + Fraction(n * n, 9000) for n in range(40)]
+    source = write_clip(tmp_path / "in.mp4", times=times, sounds=["aac"])
+    begin, end = [frame.time for frame in read(source)][10:30:19]
+    run_red(Run(source, outputs(video=tmp_path / "out.mp4"), start=begin, end=end))
+    after = sound_of(tmp_path / "out.mp4")
+    assert len(after) == pytest.approx(float(end - begin) * TONE_RATE / 1024, abs=2)
+    moments = {data: time - float(begin) for time, data in sound_of(source)}
+    expected = [moments[data] for _, data in after]
+    assert [time for time, _ in after] == pytest.approx(expected, abs=0.001)
