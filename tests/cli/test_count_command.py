@@ -279,22 +279,6 @@ def test_totals_of_the_chosen_classes_are_printed_whatever_the_detector_finds(
     assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
 
 
-def test_a_line_in_the_wrong_place_is_reported(
-    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
-) -> None:
-    lines = tmp_path / "lines.yaml"
-    lines.write_text(LINES.replace("[100, 0], end: [100, 240]", "[0, 50], end: [320, 50]"))
-    out = tmp_path / "c.json"
-    result = run("count", write_tracks(tmp_path / "t.csv"), "-c", lines, "--counts", out)
-    note = "gate: no vehicle crossed this line [line]"
-    assert result.err == f"vdet: note: {tmp_path / 't.csv'}: {note}\n"
-    counts = json.loads(out.read_text())
-    assert (counts["warnings"], counts["notes"]) == ([], [note])
-    wanted = ("--no-video", "--flows", tmp_path / "f.csv", "-c", lines)
-    result = run("detect-video", folder / "red.mp4", *red, *wanted)
-    assert result.err.count(note) == 1
-
-
 def test_lines_in_fractions_are_counted_at_in_frames_of_a_given_size(
     run: Run, tmp_path: Path
 ) -> None:

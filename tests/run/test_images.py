@@ -41,15 +41,6 @@ class TestFindingImages:
         found = find_images([tmp_path / "b.png", tmp_path, tmp_path / "a.png"])
         assert [path.name for path in found] == ["b.png", "a.png"]
 
-    @pytest.mark.parametrize(
-        ("name", "words"),
-        [("in", r"in: contains no images \(.*\.png"), ("none.png", r"none\.png: not found")],
-    )
-    def test_what_has_no_picture_is_named(self, tmp_path: Path, name: str, words: str) -> None:
-        touch(tmp_path / "in" / "notes.txt")
-        with pytest.raises(ImageError, match=words):
-            find_images([tmp_path / name])
-
 
 def placed(folder: Path, *names: str) -> dict[Path, Path]:
     return {folder / name: Path(name) for name in names}

@@ -15,6 +15,7 @@ from running import rows_of
 from traffic.scenes import ZONE, counts, frames, joined, numbered, through
 from vdet.config.scene import LineSettings
 from vdet.errors import ConfigError
+from vdet.findings import Finding
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, count_table, flow_table, per_hour, zone_table
@@ -204,7 +205,9 @@ class TestFiles:
         )
 
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:
-        self.write(flows_content, tmp_path / "f.json", {"v": at(crossing(EAST))})
+        note = Finding("line", "gate: no vehicle crossed this line", severity="note")
+        counted = replace(at(crossing(EAST)), findings=(note,))
+        self.write(flows_content, tmp_path / "f.json", {"v": counted})
         whole = json.loads((tmp_path / "f.json").read_text())
         assert whole == {
             "interval": None,
@@ -219,7 +222,7 @@ class TestFiles:
             "matrix": {"east": {"east": 0, "(none)": 1}},
             "begin": "2026-05-01 07:04:57.000+02:00",
             "warnings": [],
-            "notes": [],
+            "notes": ["gate: no vehicle crossed this line [line]"],
         }  # fmt: skip
 
     def test_totals_have_a_row_for_each_interval_direction_and_class(self, tmp_path: Path) -> None:

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from red_cars import SETTINGS
-from run.red_runs import outputs, read, result_of, run_red, write
+from run.red_runs import outputs, read, run_red
 from running import rows_of
-from vdet.boxes import Box
 from vdet.config.scene import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
-from vdet.errors import OutputError
 from vdet.run.sinks import Output
 from vdet.run.video import Run
 
@@ -71,8 +69,3 @@ def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -
     assert all(change[150:230, 98:103].any() for change in changes), "the line is not drawn"
     first, last = shown[5].image[:, :95].astype(int), shown[-1].image[:, :95]
     assert (np.abs(first - last).max(axis=2) > 60).any(), "the number stays"
-
-
-def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="no lines or zones to count at"):
-        write(Output("counts", tmp_path / "c.csv"), [result_of(Box.sized(1, 1, 9, 9))])

@@ -8,15 +8,14 @@ from typing import Self
 
 import pytest
 
-from red_cars import SETTINGS
 from run.conftest import Register
-from run.red_runs import COUNT, outputs, read, run_red, video_info
+from run.red_runs import COUNT, outputs, read, run_red
 from vdet.boxes import Image
 from vdet.errors import OutputError
 from vdet.files import OutputFiles
 from vdet.findings import Findings
 from vdet.run.sinks import Output
-from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind, check_sinks, open_sinks
+from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import FrameResult
 from vdet.run.video import Run
 
@@ -133,28 +132,6 @@ def test_if_one_sink_fails_no_output_appears_and_the_same_job_runs_again(
     assert fragile.path.read_text().split() == [str(n) for n in range(20)]
     assert len(read(tmp_path / "out.mp4")) == 20
     assert len(list((tmp_path / "stages").iterdir())) == 6
-
-
-@pytest.mark.parametrize(
-    ("sink", "name", "is_video", "words"),
-    [
-        ("video", "a.mp4", False, "is for videos"),
-        ("image", "a.png", True, "is for images"),
-        ("json", "a.json", True, "is for images"),
-    ],
-)
-def test_a_sink_refuses_results_that_it_cannot_take(
-    tmp_path: Path, sink: str, name: str, is_video: bool, words: str
-) -> None:
-    output = Output(sink, tmp_path / name)
-    with OutputFiles() as files:
-        context = SinkContext(files, SETTINGS, video_info() if is_video else None)
-        with (
-            pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"),
-            open_sinks([output], context),
-        ):
-            pass
-    assert list(tmp_path.iterdir()) == []
 
 
 @dataclass(frozen=True)
