@@ -114,17 +114,17 @@ class TestWhereNothingMoves:
         found = searched_by_network(passing, SearchRate(OF_NETWORK), threads)
         assert found == sorted({*range(0, 127, 6), *range(48, 79, 2)})
 
-    def test_a_car_that_stands_costs_as_little_as_an_empty_road(self) -> None:
-        for lefts in ([40] * 31, [None] * 31):
-            found = searched_by_network(lefts, SearchRate(OF_NETWORK), 2)
-            assert found == [0, 6, 12, 18, 24, 30]
-
     @pytest.mark.parametrize(
-        ("fps", "apart"),
-        [(Fraction(24), 6), (Fraction(24_000, 1001), 6), (Fraction(60_000, 1001), 15)],
-    )
-    def test_rates_of_films_and_of_television_rest_as_long(self, fps: Fraction, apart: int) -> None:
-        found = searched_by_network([None] * 91, SearchRate(OF_NETWORK), 2, fps)
+        ("left", "fps", "apart"),
+        [
+            (40, Fraction(25), 6), (None, Fraction(25), 6), (None, Fraction(24), 6),
+            (None, Fraction(24_000, 1001), 6), (None, Fraction(60_000, 1001), 15),
+        ],
+    )  # fmt: skip
+    def test_a_car_that_stands_costs_as_little_as_an_empty_road_at_any_rate(
+        self, left: int | None, fps: Fraction, apart: int
+    ) -> None:
+        found = searched_by_network([left] * 91, SearchRate(OF_NETWORK), 2, fps)
         assert found == list(range(0, 91, apart))
 
     @pytest.mark.parametrize("at", [0, 6])

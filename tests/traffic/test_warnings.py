@@ -1,5 +1,7 @@
 """Lines that are not where they should be."""
 
+from collections.abc import Sequence
+
 import pytest
 
 from traffic.scenes import LINE, Path, counts, frames, through
@@ -9,12 +11,35 @@ from vdet.findings import Finding, with_counted
 DOWN = through((1, 600, 300), (5, 600, 500))
 
 
-def warnings(*paths: object, line: LineSettings = LINE) -> tuple[str, ...]:
-    return counts(frames(*paths), line).warnings  # type: ignore[arg-type]
+BESIDE = "tracks that begin or end at this line and are not counted: 1;"
+SCENES: dict[str, tuple[Sequence[Path], str]] = {
+    "a vehicle crosses": ([], ""),
+    "a track begins at the line": ([through((1, 600, 405), (5, 600, 700))], BESIDE),
+    "a track ends at the line": ([through((1, 600, 100), (5, 600, 380))], BESIDE),
+    "at the start of the video": ([through((0, 600, 405), (5, 600, 700))], ""),
+    "at the end of the video": ([through((5, 600, 100), (10, 600, 380))], ""),
+    "beyond the end of the line": ([through((1, 1100, 405), (5, 1100, 700))], ""),
+    "beside the line, but it is counted": ([through((1, 600, 385), (5, 600, 700))], ""),
+    "one of many": (
+        [
+            *(through((1, 250 + 20 * n, 300), (5, 250 + 20 * n, 500)) for n in range(30)),
+            through((1, 600, 405), (5, 600, 700)),
+        ],
+        "",
+    ),
+    "the line runs along the way": (
+        [through((1, 300, 330), (3, 500, 470), (5, 700, 330), (7, 900, 470))],
+        "paths that cross this line more than once: 1;",
+    ),
+}
+"""What moves beside a vehicle that crosses, and the warning."""
 
 
-def test_a_line_across_the_way_is_fine() -> None:
-    assert warnings(DOWN) == ()
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_line_in_the_wrong_place_has_a_warning(scene: str) -> None:
+    paths, warning = SCENES[scene]
+    found = counts(frames(DOWN, *paths), LINE).warnings
+    assert [text.startswith(f"line: {warning}") for text in found] == [True] * bool(warning)
 
 
 def test_a_line_that_no_vehicle_crosses_is_noted() -> None:
@@ -31,42 +56,9 @@ def test_that_nothing_was_found_is_noted_once(paths: tuple[Path, ...]) -> None:
     assert with_counted((), found) == found
 
 
-@pytest.mark.parametrize(
-    "path", [through((1, 600, 405), (5, 600, 700)), through((1, 600, 100), (5, 600, 380))]
-)
-def test_a_line_at_which_tracks_begin_or_end(path: object) -> None:
-    (found,) = warnings(DOWN, path)
-    assert found.startswith("line: tracks that begin or end at this line and are not counted: 1;")
-
-
-@pytest.mark.parametrize(
-    "path",
-    [
-        through((0, 600, 405), (5, 600, 700)),
-        through((5, 600, 100), (10, 600, 380)),
-        through((1, 1100, 405), (5, 1100, 700)),
-        through((1, 600, 385), (5, 600, 700)),
-    ],
-    ids=["at the start of the video", "at its end", "beyond the line", "and is counted"],
-)
-def test_other_ends_of_tracks_are_fine(path: object) -> None:
-    assert warnings(DOWN, path) == ()
-
-
-def test_a_line_that_runs_along_the_way() -> None:
-    along = through((1, 300, 330), (3, 500, 470), (5, 700, 330), (7, 900, 470))
-    (found,) = warnings(DOWN, along)
-    assert found.startswith("line: paths that cross this line more than once: 1;")
-
-
-def test_a_few_among_many_are_no_fault_of_the_line() -> None:
-    many = [through((1, 250 + 20 * n, 300), (5, 250 + 20 * n, 500)) for n in range(30)]
-    assert warnings(*many, through((1, 600, 405), (5, 600, 700))) == ()
-
-
 def test_a_line_that_is_shorter_than_a_vehicle() -> None:
     short = LineSettings(name="line", start=(580, 400), end=(620, 400))
-    assert warnings(DOWN, line=short) == (
+    assert counts(frames(DOWN), short).warnings == (
         "line: this line is shorter than a vehicle; make it longer [line]",
     )
 
