@@ -29,7 +29,12 @@ from vdet.track.track import Track
 
 RATE = Fraction(25)
 COUNT = 63
-SHOWN = {1: ("car", range(22, 27)), 2: ("car", range(25, 29)), 3: ("fire truck", range(50, 52))}
+Shown = Mapping[int, tuple[str, Collection[int]]]
+SHOWN: Shown = {
+    1: ("car", range(22, 27)),
+    2: ("car", range(25, 29)),
+    3: ("fire truck", range(50, 52)),
+}
 """The class of each vehicle, and the frames that show it."""
 
 
@@ -40,9 +45,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_clip(path, count=COUNT, options=B_FRAMES | {"g": "10"}, sounds=["aac"])
 
 
-def results(
-    vehicles: Mapping[int, tuple[str, Collection[int]]] = SHOWN, count: int = COUNT
-) -> list[FrameResult]:
+def results(vehicles: Shown = SHOWN, count: int = COUNT) -> list[FrameResult]:
     found = []
     for index in range(count):
         shown = [
@@ -84,25 +87,24 @@ def test_a_clip_is_copied_from_key_frame_to_key_frame_for_each_time_with_vehicle
     assert seconds == pytest.approx(30 / RATE, abs=0.1), "with the sound of its frames"
 
 
+LAST = [COUNT - 2, COUNT - 1]
+
+
+@pytest.mark.parametrize(
+    ("margin", "shown", "clips"),
+    [
+        (0.2, SHOWN, [[*range(17, 34)], [*range(45, 57)]]),
+        (
+            *(0, {1: ("car", [20, 21]), 2: ("car", range(30, 34)), 3: ("bus", LAST)}),
+            [[20, 21], [30, 31, 32, 33], LAST],
+        ),
+    ],
+)
 def test_an_exact_clip_has_the_frames_from_the_margin_before_to_the_margin_after(
-    source: Path, tmp_path: Path
+    source: Path, tmp_path: Path, margin: float, shown: Shown, clips: list[list[int]]
 ) -> None:
-    assert cut(source, tmp_path, exact=True) == {
-        "clip-00-00-00-car-1+1.mp4": list(range(17, 34)),
-        "clip-00-00-02-fire-truck-3.mp4": list(range(45, 57)),
-    }
-
-
-def test_an_exact_clip_without_margin_has_all_frames_of_its_vehicle(
-    source: Path, tmp_path: Path
-) -> None:
-    last = [COUNT - 2, COUNT - 1]
-    shown = results({1: ("car", [20, 21]), 2: ("car", range(30, 34)), 3: ("bus", last)})
-    assert list(cut(source, tmp_path, exact=True, margin=0, shown=shown).values()) == [
-        [20, 21],
-        [30, 31, 32, 33],
-        last,
-    ]
+    found = cut(source, tmp_path, exact=True, margin=margin, shown=results(shown))
+    assert list(found.values()) == clips
 
 
 def test_a_clip_that_cannot_be_cut_is_left_out_with_a_warning(

@@ -19,7 +19,7 @@ from vdet.media import Picture, VideoInfo
 from vdet.media.frame import Coding, Planes
 from vdet.run.sinks.drawn import Overlay
 from vdet.run.steps import FrameResult
-from vdet.track.track import Track
+from vdet.track.track import State, Track
 
 LENS = LensSettings(
     size=(WIDTH, HEIGHT),
@@ -57,25 +57,29 @@ def road_seen(camera: LensSettings | None) -> Road:
     return finder.update(finder.observe(Picture(road(CAR))))
 
 
-def test_lost_vehicles_are_drawn_dashed() -> None:
-    seen, lost = (Track(1, CAR, 0.9, state) for state in ("detected", "predicted"))
-    expected = road(CAR)
-    draw_box(expected, CAR, color_of(1), "1", dashed=True)
-    dashed = drawn_on(result_of(lost))
-    np.testing.assert_array_equal(dashed, expected)
-    solid = drawn_on(result_of(seen))
-    lower = np.s_[CAR.pixels[3] - 1, CAR.pixels[0] : CAR.pixels[2]]
-    drawn, gaps = (solid[lower] == color_of(1)).all(1), (dashed[lower] != solid[lower]).any(1)
-    assert drawn.all()
-    assert 0.2 < gaps.mean() < 0.8
-
-
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("1", {}),
+        ("0.90", {"video": None, "trails": 2.0}),  # a still picture has no ids or trails
+        ("car 1", {"label": ("class", "id")}),
+        ("0.90", {"label": ("score",)}),
+        ("24 m 0.90", {"label": ("distance", "score")}),  # in this order
+    ],
+)
 @pytest.mark.parametrize("camera", [None, LENS], ids=["without lanes", "with lanes"])
-def test_vehicles_are_drawn_where_they_are_in_the_frame(camera: LensSettings | None) -> None:
-    found = road_seen(camera) if camera else None
+@pytest.mark.parametrize("state", ["detected", "predicted"])
+def test_a_vehicle_is_drawn_where_it_is_with_its_label_and_dashed_if_it_is_lost(
+    state: State, camera: LensSettings | None, text: str, options: dict[str, Any]
+) -> None:
+    track = Track(1, CAR, 0.9, state, "car" if "car" in text else None, distance=23.6)
+    result = result_of(track, found=road_seen(camera) if camera else None)
     expected = road(CAR)
-    draw_box(expected, CAR, color_of(1), "1")
-    np.testing.assert_array_equal(drawn_on(result_of(CAR, found=found)), expected)
+    draw_box(expected, CAR, color_of(1), text, dashed=state == "predicted")
+    np.testing.assert_array_equal(drawn_on(result, **options), expected)
+    edge = expected[CAR.pixels[3] - 1, CAR.pixels[0] : CAR.pixels[2]]
+    drawn = (edge == color_of(1)).all(axis=1).mean()
+    assert drawn == 1 if state == "detected" else 0.2 < drawn < 0.8
 
 
 @pytest.mark.parametrize("settings", [{}, {"trails": 1.0}])
@@ -98,26 +102,6 @@ def test_a_frame_that_came_as_planes_stays_planes_and_looks_the_same(
 
 def white(width: int, height: int) -> Image:
     return np.full((height, width, 3), 255, np.uint8)
-
-
-# Labels
-
-
-@pytest.mark.parametrize(
-    ("label", "text"),
-    [(("class", "id"), "car 3"), (("score",), "0.90"), (("distance", "score"), "24 m 0.90")],
-)
-def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], text: str) -> None:
-    track = Track(3, CAR, 0.9, state="detected", class_name="car", distance=23.6)
-    expected = road(CAR)
-    draw_box(expected, CAR, color_of(3), text)
-    np.testing.assert_array_equal(drawn_on(result_of(track), label=label), expected)
-
-
-def test_a_still_picture_shows_scores_without_ids_or_trails() -> None:
-    expected = road(CAR)
-    draw_box(expected, CAR, color_of(1), "0.90")
-    np.testing.assert_array_equal(drawn_on(result_of(CAR), video=None, trails=2.0), expected)
 
 
 # Boxes
