@@ -49,16 +49,16 @@ def placed(folder: Path, *names: str) -> dict[Path, Path]:
 @pytest.mark.parametrize(
     ("names", "out", "stages", "paths"),
     [
-        (("a.png",), "found.jpg", None, ["image found.jpg"]),
-        (("a.png", "north/a.png"), "out", None, ["image out/a.png", "image out/north/a.png"]),
-        (("a.png", "b.png"), None, "stages", ["stages stages/a", "stages stages/b"]),
+        (("a.png",), Path("found.jpg"), None, ["image found.jpg"]),
+        (("a.png", "north/a.png"), Path("out"), None, ["image out/a.png", "image out/north/a.png"]),
+        (("a.png", "b.png"), None, Path("stages"), ["stages stages/a", "stages stages/b"]),
     ],
 )
 def test_one_picture_goes_to_the_file_named_and_several_below_the_folder(
-    names: Sequence[str], out: str | None, stages: str | None, paths: Sequence[str]
+    names: Sequence[str], out: Path | None, stages: Path | None, paths: Sequence[str]
 ) -> None:
     sources = placed(Path("in"), *names)
-    jobs = plan_images(sources, out and Path(out), stages and Path(stages), OutputFiles())
+    jobs = plan_images(sources, out, stages, OutputFiles())
     assert [job.source for job in jobs] == list(sources)
     assert [f"{output.sink} {output.path}" for job in jobs for output in job.outputs] == paths
 

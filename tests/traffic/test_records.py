@@ -85,19 +85,17 @@ class TestPath:
         assert found.states == {"detected": 3, "predicted": 2}
 
 
-class TestMotion:
-    def motions(self, *, is_still: bool) -> dict[int, str | None]:
-        """Return the motion of vehicles that drive and stand."""
-        made = VehicleRecords(WIDTH)
-        for second in range(70):
-            tracks = [track(1, Box.sized(3 * second, 100, 40, 30)), track(2, PLACE)]
-            if second < 30:
-                tracks.append(track(3, Box.sized(200, 180, 50, 40)))
-            made.add(frame(second, *tracks, rate=1))
-        return {item.id: item.motion for item in made.end(is_still=is_still)}
-
-    def test_what_stands_is_told_apart_from_what_drives(self) -> None:
-        assert self.motions(is_still=True) == {1: "drove", 2: "standing", 3: "unknown"}
-
-    def test_a_camera_that_moves_leaves_it_open(self) -> None:
-        assert self.motions(is_still=False) == dict.fromkeys((1, 2, 3))
+@pytest.mark.parametrize(
+    ("is_still", "motions"),
+    [(True, {1: "drove", 2: "standing", 3: "unknown"}), (False, dict.fromkeys((1, 2, 3)))],
+)
+def test_what_stands_before_a_fixed_camera_is_told_apart_from_what_drives(
+    is_still: bool, motions: dict[int, str | None]
+) -> None:
+    made = VehicleRecords(WIDTH)
+    for second in range(70):
+        tracks = [track(1, Box.sized(3 * second, 100, 40, 30)), track(2, PLACE)]
+        if second < 30:
+            tracks.append(track(3, Box.sized(200, 180, 50, 40)))
+        made.add(frame(second, *tracks, rate=1))
+    assert {item.id: item.motion for item in made.end(is_still=is_still)} == motions

@@ -118,16 +118,16 @@ def test_a_turning_vehicle_has_the_speed_of_its_middle() -> None:
 
 
 @pytest.mark.parametrize(
-    "places",
-    [driving(10.0, seconds=0.4), driving(10.0, start=200), driving(10.0, start=-8, seconds=1)],
-    ids=["too short", "far beyond the area", "behind the camera"],
+    ("places", "state"),
+    [
+        pytest.param(driving(10.0, seconds=0.4), "detected", id="too short"),
+        pytest.param(driving(10.0, start=200), "detected", id="far beyond the area"),
+        pytest.param(driving(10.0, start=-8, seconds=1), "detected", id="behind the camera"),
+        pytest.param(driving(10.0), "predicted", id="lost"),
+    ],
 )
-def test_what_is_not_known_has_no_speed(places: Float64Array) -> None:
-    assert measured(places) is None
-
-
-def test_a_lost_vehicle_has_no_speed() -> None:
-    assert measured(driving(10.0), state="predicted") is None
+def test_what_is_not_known_has_no_speed(places: Float64Array, state: State) -> None:
+    assert measured(places, state=state) is None
 
 
 @pytest.mark.parametrize("back", [0.04, 2.0])
@@ -144,19 +144,8 @@ def test_a_vehicle_that_comes_back_after_long_keeps_its_speed(back: float) -> No
     assert [speed is not None for speed in speeds] == [True, False, back > 1]
 
 
-@pytest.mark.parametrize(
-    ("scale", "warnings"),
-    [
-        (1.0, ()),
-        (
-            4.0,
-            ("camera.ground: cars are 18.0 m long by these points; check their metres [ground]",),
-        ),
-    ],
-)
-def test_cars_that_are_too_long_show_that_points_are_wrong(
-    scale: float, warnings: tuple[str, ...]
-) -> None:
+@pytest.mark.parametrize(("scale", "is_wrong"), [(1.0, False), (4.0, True)])
+def test_cars_that_are_too_long_show_that_points_are_wrong(scale: float, is_wrong: bool) -> None:
     ground = fit_ground(seen(CORNERS), scale * CORNERS, Undistorter(None, WIDTH, HEIGHT))
     meter, events = SpeedMeter(ground, WIDTH, HEIGHT), []
     for number in range(5):
@@ -167,4 +156,5 @@ def test_cars_that_are_too_long_show_that_points_are_wrong(
             frame = FrameTracks(index, index / RATE, (Track(number, box, 0.9, "detected", "car"),))
             meter.add(frame)
     counts = Counts(events=tuple(events), directions=(("gate", "in"),), zones=())
-    assert with_speeds(counts, meter).warnings == warnings
+    text = "camera.ground: cars are 18.0 m long by these points; check their metres [ground]"
+    assert with_speeds(counts, meter).warnings == (text,) * is_wrong
