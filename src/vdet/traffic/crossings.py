@@ -555,63 +555,39 @@ def crossings(path: VehiclePath, border: Border) -> list[Crossing]:
     return visits
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _SideRun:
-    """Consecutive rows of a path on one side of a border, from row `start`.
-
-    `height` is the minimum height of the box, pixels, of the rows in which the vehicle settles;
-    `is_clear` says whether it is clearly on this side in one of them.
-    """
-
-    start: int
-    is_positive: bool
-    height: float
-    is_clear: bool
-
-
 def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
     """Yield the changes of the settled side, and the start of a path inside a zone."""
-    is_positive: bool | None = None  # the settled side
-    latest: Point | None = None  # of the latest crossing, unless it was beyond the line's ends
-    for run in _runs(path, border):
-        if is_positive is None:
-            is_positive = run.is_positive
-            if is_positive and isinstance(border, Zone):
-                yield Crossing(float(path.times[0]), 0, APPEAR)
-        elif run.is_positive != is_positive:
-            # Where the path passes the border, between the previous row and the first of the run.
-            rows = slice(run.start - 1, run.start + 1)
-            (ax, ay), (bx, by) = path.points[rows].tolist()
-            before, after = path.times[rows].tolist()
-            meets = border.meeting(((ax, ay), (bx, by)))  # None: beyond the line's ends
-            along = 1.0 if meets is None else meets
-            point = ax + along * (bx - ax), ay + along * (by - ay)
-            distance = math.dist(latest, point) if latest else math.inf
-            if run.is_clear or run.height <= distance:  # else it is still near the latest crossing
-                is_positive, latest = run.is_positive, None
-                if meets is not None:
-                    latest, direction = point, border.directions[0 if is_positive else 1]
-                    row = run.start if along else run.start - 1
-                    yield Crossing(before + along * (after - before), row, direction)
-
-
-def _runs(path: VehiclePath, border: Border) -> Iterator[_SideRun]:
-    """Yield the runs in which the vehicle settles; none if it stays on one side, except inside."""
     distances = border.distances(path.points)
     is_positive = distances >= 0
     turns = (np.flatnonzero(is_positive[1:] != is_positive[:-1]) + 1).tolist()
     if not turns and not (is_positive[0] and isinstance(border, Zone)):
         return  # as for most paths
     settles, is_clear = _settling(path, border, distances)
+    side: bool | None = None  # the settled one; True: the positive one
+    latest: Point | None = None  # of the latest crossing, unless it was beyond the line's ends
     for start, end in pairwise([0, *turns, len(is_positive)]):
-        rows = start + np.flatnonzero(settles[start:end])
-        if len(rows):
-            yield _SideRun(
-                start,
-                is_positive=bool(is_positive[start]),
-                height=float(path.heights[rows].min()),
-                is_clear=bool(is_clear[rows].any()),
-            )
+        settled = start + np.flatnonzero(settles[start:end])
+        if not len(settled) or side == is_positive[start]:
+            continue
+        if side is None:
+            side = bool(is_positive[start])
+            if side and isinstance(border, Zone):
+                yield Crossing(float(path.times[0]), 0, APPEAR)
+            continue
+        # Where the path passes the border, between the row before and the first on this side.
+        rows = slice(start - 1, start + 1)
+        (ax, ay), (bx, by) = path.points[rows].tolist()
+        before, after = path.times[rows].tolist()
+        meets = border.meeting(((ax, ay), (bx, by)))  # None: beyond the line's ends
+        along = 1.0 if meets is None else meets
+        point = ax + along * (bx - ax), ay + along * (by - ay)
+        distance = math.dist(latest, point) if latest else math.inf
+        if is_clear[settled].any() or path.heights[settled].min() <= distance:
+            side, latest = not side, None  # else it is still near the latest crossing
+            if meets is not None:
+                latest, direction = point, border.directions[0 if side else 1]
+                row = start if along else start - 1
+                yield Crossing(before + along * (after - before), row, direction)
 
 
 def _settling(
