@@ -6,13 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.labels.label import (
-    Format,
-    SavedTracks,
-    SourceVideo,
-    TrackWriter,
-    check_frames,
-)
+from vdet.labels.label import Format, SavedTracks, SourceVideo, TrackWriter, check_frames
 from vdet.labels.reading import read_tracks
 from vdet.track.track import FrameTracks, Track
 

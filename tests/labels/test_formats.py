@@ -30,12 +30,7 @@ def test_every_format_has_an_ending_of_its_own() -> None:
 
 @pytest.mark.parametrize(
     ("name", "form"),
-    [
-        ("gt.txt", MOT),
-        ("gt", MOT),
-        ("gt.csv", MOT),
-        ("instances_default.json", COCO),
-    ],
+    [("gt.txt", MOT), ("gt", MOT), ("gt.csv", MOT), ("instances_default.json", COCO)],
 )
 def test_the_content_tells_the_format_where_the_name_leaves_it_open(
     tmp_path: Path, name: str, form: Format
@@ -218,11 +213,7 @@ WRONG_LINES = [
         ":4: more than 10,000 frames a second; times must be seconds",
     ),
     ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
-    (
-        "jsonl",
-        JSONL + record(video=VIDEO),
-        ":5: another video begins; each video needs its own",
-    ),
+    ("jsonl", JSONL + record(video=VIDEO), ":5: another video begins; each video needs its own"),
     ("jsonl", WHOLE + record(frame=5), ":2: another video begins; each video needs its own"),
     ("jsonl", record(last=False) + "\n" + record(frame=5), ": is cut off after frame 5; copy"),
     *(

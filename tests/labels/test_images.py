@@ -129,10 +129,7 @@ def test_a_label_that_occurs_twice_counts_once(
 ) -> None:
     write_coco(tmp_path, scene_of((1, 2, 20, 10), (1, 2, 20, 10), (1, 2, 20, 11)))
     (picture,) = read_labelled_images(tmp_path).images
-    assert [astuple(label.box) for label in picture.labels] == [
-        (1, 2, 21, 12),
-        (1, 2, 21, 13),
-    ]
+    assert [astuple(label.box) for label in picture.labels] == [(1, 2, 21, 12), (1, 2, 21, 13)]
     assert caplog.messages == [f"{tmp_path}: has 1 label twice in the same image; each counts once"]
 
 
@@ -293,12 +290,7 @@ class TestYolo:
         path.write_text("0 0.5 0.5 0.1 0.1\n1 0.25 0.5 0.5 0.75 0.375 1\n", encoding="utf-8")
         image = read_labelled_images(tmp_path).images[0]
         assert [label.class_name for label in image.labels] == ["car", "truck"]
-        assert astuple(image.labels[1].box) == (
-            0.25 * WIDTH,
-            0.5 * HEIGHT,
-            0.5 * WIDTH,
-            HEIGHT,
-        )
+        assert astuple(image.labels[1].box) == (0.25 * WIDTH, 0.5 * HEIGHT, 0.5 * WIDTH, HEIGHT)
 
     def test_what_lies_less_than_a_pixel_outside_is_moved_to_the_side(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)

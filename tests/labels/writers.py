@@ -126,8 +126,5 @@ def exported(frames: Mapping[int, Sequence[int]], **known: object) -> bytes:
     return json.dumps(document).encode()
 
 
-WRITERS: dict[str, Callable[[Path, Pictures], Path]] = {
-    "COCO": write_coco,
-    "YOLO": write_yolo,
-}
+WRITERS: dict[str, Callable[[Path, Pictures], Path]] = {"COCO": write_coco, "YOLO": write_yolo}
 """By the name of the form; each returns the label file of the first picture by name."""

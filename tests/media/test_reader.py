@@ -375,14 +375,8 @@ NOT_SURE: dict[str, tuple[str, dict[str, Any]]] = {
     "no times": ("h264", {}),
     "avi": ("avi", {}),
     "hidden frames": ("webm", {"codec": "libvpx", "options": {"auto-alt-ref": "1", "g": "10"}}),
-    "intra refresh": (
-        "mp4",
-        {"options": {"g": "20", "bf": "0", "x264-params": "intra-refresh=1"}},
-    ),
-    "intra refresh, b-frames": (
-        "mkv",
-        {"options": {"g": "20", "x264-params": "intra-refresh=1"}},
-    ),
+    "intra refresh": ("mp4", {"options": {"g": "20", "bf": "0", "x264-params": "intra-refresh=1"}}),
+    "intra refresh, b-frames": ("mkv", {"options": {"g": "20", "x264-params": "intra-refresh=1"}}),
     "interlaced": ("mp4", {"options": {"g": "10", "flags": "+ildct+ilme", "x264-params": "tff=1"}}),
 }
 
