@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
-from vdet.config.kinds import HeatSettings, WindowSettings
+from vdet.config.kinds import HeatSettings
 from vdet.detect.svm.detector import Heat, find_regions, sum_heat
-from vdet.detect.svm.windows import Windows, band_grid
+from vdet.detect.svm.windows import Windows
 
 Hit = tuple[int, int, int, int, float, float]
 """x, y, width and height of a vehicle, probability, and weight."""
@@ -58,13 +58,6 @@ def test_heat_of_larger_frames_is_blurred(votes: float | None, rows: int, kernel
     sharp[24 // side : 40 // side, 40 // side : 60 // side] = 1
     expected = cv2.GaussianBlur(sharp, (kernel, kernel), 0)
     np.testing.assert_allclose(blurred.values, expected, atol=1e-6)
-
-
-@pytest.mark.parametrize("overlap", [0, 0.5, 0.75])
-def test_with_votes_heat_does_not_depend_on_overlap(overlap: float) -> None:
-    grid = band_grid(WindowSettings(size=20, overlap=overlap, top=0, bottom=60), *SIZE)
-    found = windows_of([(*box, 1, grid.weight) for box in grid.boxes.tolist()])
-    assert sum_heat([found], SIZE, HeatSettings(votes=0.1)).values[7, 12] == pytest.approx(1)
 
 
 def drawn(*boxes: tuple[int, int, int, int, float], shrink: int = 1) -> Heat:

@@ -94,19 +94,13 @@ class TestParts:
         assert boxes(found) == [LEFT]
 
 
-class TestRegions:
-    @pytest.mark.parametrize(
-        "aside", [(Box.sized(130, 90, 100, 100),), (Box.sized(400, 90, 9, 9), EVERYWHERE)]
-    )
-    def test_regions_that_overlap_do_not_count_a_vote_twice(self, aside: tuple[Box, ...]) -> None:
-        votes = around(LEFT)
-        (alone,) = split(votes)
-        assert split(votes, Box.sized(90, 90, 100, 100), *aside) == [alone]
-
-
-def collected(*windows: Windows) -> Votes:
-    """Collect the votes in a frame of 100 × 100 pixels."""
-    return Votes.of(windows, (100, 100))
+@pytest.mark.parametrize(
+    "aside", [(Box.sized(130, 90, 100, 100),), (Box.sized(400, 90, 9, 9), EVERYWHERE)]
+)
+def test_regions_that_overlap_do_not_count_a_vote_twice(aside: tuple[Box, ...]) -> None:
+    votes = around(LEFT)
+    (alone,) = split(votes)
+    assert split(votes, Box.sized(90, 90, 100, 100), *aside) == [alone]
 
 
 class TestCollecting:
@@ -118,7 +112,7 @@ class TestCollecting:
             weights = np.asarray(values / 4, np.float32)
             return Windows(np.zeros((count, 4), np.int32), values, weights, vehicles)
 
-        votes = collected(windows(2, 0), windows(0, 0), windows(1, 50))
+        votes = Votes.of((windows(2, 0), windows(0, 0), windows(1, 50)), (100, 100))
         assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 11, 20], [50, 0, 60, 20]]
         assert votes.presence.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
         assert votes.boxes.dtype == votes.presence.dtype == votes.position.dtype == np.float64
