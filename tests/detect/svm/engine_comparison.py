@@ -11,8 +11,8 @@ from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
 from vdet.config.kinds import FeatureSettings, WindowSettings
-from vdet.detect.svm.model import LinearModel, describe, resize, split
-from vdet.detect.svm.windows import DenseSearch, FramePyramid, WindowGrid, band_grid
+from vdet.detect.svm.model import BoxRegression, LinearModel, describe, resize, split
+from vdet.detect.svm.windows import WINDOW_SIDES, DenseSearch, FramePyramid, WindowGrid, band_grid
 from vdet.media import Picture, Planes
 from vdet.synthetic import Renderer, demo_scene
 
@@ -24,10 +24,15 @@ _EACH = 120  # patches of each class
 
 @dataclass(frozen=True, slots=True)
 class EngineResults:
-    """The log-odds of the same windows from the dense engine and from the patch engine."""
+    """The log-odds of the same windows from the dense engine and from the patch engine.
+
+    The sides are those of the windows that are hits of both, `(n, 4)`.
+    """
 
     dense: Float32Array
     patch: Float32Array
+    dense_sides: Float32Array
+    patch_sides: Float32Array
 
     @property
     def correlation(self) -> float:
@@ -38,13 +43,23 @@ class EngineResults:
         """The fraction of windows that both engines put on the same side of probability 0.5."""
         return float(np.mean((self.dense >= 0) == (self.patch >= 0)))
 
+    @property
+    def sides_apart(self) -> float:
+        """The largest difference of a side, in sides of the window."""
+        return float(np.abs(self.dense_sides - self.patch_sides).max())
+
 
 def compare(model: LinearModel, grids: list[WindowGrid], pixels: Image | Planes) -> EngineResults:
     """Search a frame with both engines."""
     frame = _pyramid(pixels, model.features, grids)
-    dense = [DenseSearch(model, grid).search(frame, 0.5)[0] for grid in grids]
-    patch = [PatchSearch(model, grid).search(frame, 0.5)[0] for grid in grids]
-    return EngineResults(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
+    dense, patch = (
+        [engine(model, grid).search(frame, 0.5) for grid in grids]
+        for engine in (DenseSearch, PatchSearch)
+    )
+    odds = [log_odds(np.concatenate([found for found, _ in engine])) for engine in (dense, patch)]
+    hits = (odds[0] >= 0) & (odds[1] >= 0)
+    sides = [np.concatenate([found for _, found in engine])[hits] for engine in (dense, patch)]
+    return EngineResults(*odds, *sides)
 
 
 def _pyramid(
@@ -70,7 +85,11 @@ def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
     fits = [_ridge(vectors[part].astype(np.float64), labels[part]) for part in parts]
     weights, biases = (np.array(item, np.float32) for item in zip(*fits, strict=True))
     slopes = np.full(members, -4, np.float32)
-    return LinearModel(features, weights, biases, slopes, np.zeros(members, np.float32))
+    factors = np.array([[1], [-0.5], [0.5], [-1]], np.float32)
+    boxes = BoxRegression(factors * weights[0, : features.hog_length], WINDOW_SIDES)
+    return LinearModel(
+        features, weights, biases, slopes, np.zeros(members, np.float32), box_regression=boxes
+    )
 
 
 def _ridge(vectors: Exact, targets: Exact) -> tuple[Exact, Exact]:

@@ -1,9 +1,7 @@
 """The dense search: it finds what the search of single patches finds, in planes and in BGR."""
 
 from dataclasses import replace
-from fractions import Fraction
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -25,7 +23,6 @@ from vdet.boxes import Image
 from vdet.config.kinds import (
     FeatureSettings,
     HistogramSettings,
-    HogSettings,
     PerspectiveSettings,
     SearchSettings,
     WindowSettings,
@@ -33,13 +30,10 @@ from vdet.config.kinds import (
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmDetector
-from vdet.detect.svm.model import BoxRegression, LinearModel, describe, resize, split
+from vdet.detect.svm.model import BoxRegression, LinearModel, resize, split
 from vdet.detect.svm.windows import (
-    WINDOW_SIDES,
-    DenseSearch,
     FramePyramid,
     FrameStrip,
-    WindowGrid,
     Windows,
     window_grids,
 )
@@ -222,46 +216,6 @@ def test_beyond_the_sides_the_outermost_columns_repeat(
     np.testing.assert_array_equal(cut, as_in_training)
 
 
-FEATURES = FeatureSettings(patch=64, halved=(), hog=HogSettings(cell=8))
-GRIDS = [(64, 8), (64, 16), (64, 12), (128, 24), (128, 25), (80, 13)]
-"""Sizes and steps: whole cells, one and a half, and other distances."""
-
-
-def texture(side: int) -> Image:
-    coarse = np.random.default_rng(3).integers(0, 256, (8, 8, 3), dtype=np.uint8)
-    return np.asarray(cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC), np.uint8)
-
-
-def texture_finder() -> LinearModel:
-    """Return a model for which the texture is the most probable vehicle."""
-    vector = describe(split(texture(64), FEATURES), FEATURES)
-    vector[FEATURES.hog_length :] = 0
-    weights = vector[np.newaxis] / np.linalg.norm(vector) ** 2
-    one = np.ones(1, np.float32)
-    return LinearModel(FEATURES, weights, biases=-0.7 * one, slopes=-8 * one, offsets=0 * one)
-
-
-@pytest.mark.parametrize(("size", "step"), GRIDS)
-def test_the_sides_in_a_hit_are_those_of_its_hog_features(size: int, step: int) -> None:
-    """The regression repeats the model, so the sides of a hit give its decision value."""
-    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
-    model = texture_finder()
-    weights = np.repeat(model.weights[:, : FEATURES.hog_length], 4, axis=0)
-    regression = BoxRegression(weights, np.repeat(model.biases, 4))
-    search = DenseSearch(replace(model, box_regression=regression), grid)
-    frame = FramePyramid(Picture(texture(400)), FEATURES)
-    minimum = float(np.median(search.search(frame, 1)[0]))
-    probabilities, sides = search.search(frame, minimum)
-    hits = probabilities >= minimum
-    assert sides.shape == (35, 4)
-    assert sides.dtype == np.float32
-    for side in sides[hits].T:
-        expected = model.to_probabilities(side[:, np.newaxis])
-        np.testing.assert_allclose(probabilities[hits], expected, atol=1e-5)
-    assert len(np.unique(sides[hits].round(4))) > 8
-    np.testing.assert_array_equal(sides[~hits], np.tile(WINDOW_SIDES, (17, 1)))
-
-
 SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
 PAIRS = {
     "a cell": grid_of(64, overlap=0.875),
@@ -281,6 +235,7 @@ def assert_agree(results: EngineResults, same: float = 0.97) -> None:
     assert (results.patch > 0).any(), "nothing is found: decisions cannot differ"
     assert results.correlation >= 0.99
     assert results.same >= same
+    assert results.sides_apart < 0.1
 
 
 @pytest.mark.parametrize(("name", "members"), [("seed", 3), ("default", 1), ("default", 3)])
