@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
 from vdet.config.classes import STANDARD_CLASSES, UNKNOWN
-from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images, write_coco_images
 from vdet.labels.images import LabelledImage
-from vdet.labels.label import Format, SavedTracks, track_formats
+from vdet.labels.label import Format, track_formats
 from vdet.labels.lines import CSV, JSON_LINES, MOT
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image
@@ -108,25 +107,6 @@ def test_what_is_written_is_read_again(
     if any(saved):
         assert saved.video == (VIDEO if form in LISTING else None)
         assert saved.size == ((1280, 720) if form in LISTING else None)
-
-
-@every_format
-@settings(max_examples=40)
-@given(st.data())
-def test_a_damaged_file_is_read_or_refused_in_one_line(
-    tmp_path_factory: pytest.TempPathFactory, form: Format, data: st.DataObject
-) -> None:
-    content = written(form, [frame(index, car(1), car(2)) for index in (0, 1, 3)])
-    at = data.draw(st.integers(0, len(content)))
-    end = data.draw(st.integers(at, min(len(content), at + 12)))
-    damage = data.draw(st.binary(max_size=6) | st.text(max_size=6).map(str.encode))
-    try:
-        result: SavedTracks | str = read_back(
-            form, tmp_path_factory.getbasetemp(), content[:at] + damage + content[end:]
-        )
-    except TruthError as error:
-        result = str(error)
-    assert isinstance(result, SavedTracks) or "\n" not in result
 
 
 @every_format

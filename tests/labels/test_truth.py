@@ -9,14 +9,14 @@ import pytest
 from labels.saving import Row, car, checked_video, frame, row, video_of, written
 from labels.writers import exported
 from vdet.boxes import Box
-from vdet.config.classes import STANDARD_CLASSES
 from vdet.config.loading import load_settings
+from vdet.config.schema import Role
 from vdet.errors import TruthError
 from vdet.evaluate.results import score_files
 from vdet.evaluate.scores import compare
 from vdet.labels.label import NO_ID, Format, SavedTracks, SourceVideo, numbered_lines, track_formats
 from vdet.labels.lines import MOT as MOT_FORMAT
-from vdet.labels.reading import DEFAULT_ROLES, Roles, read_truth
+from vdet.labels.reading import Roles, read_truth
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
 CSV = "frame,time,id,x,y,width,height,class\n0,0,7,11,21,30,40,car\n"
@@ -94,60 +94,43 @@ def test_what_is_found_after_the_last_vehicle_is_false(tmp_path: Path) -> None:
     assert read_truth(path).until(8).length == 6
 
 
-@pytest.mark.parametrize(
-    ("labels", "role"),
-    [
-        (("Car", "van", "TRUCK", "lorry", "bus", "vehicle", "Pick-up", "tuk-tuk"), "vehicle"),
-        (("Motorbike", "Cyclist"), "vehicle"),
-        (("DontCare", "dont_care", "Ignore region", "Misc", "trailer"), "ignored"),
-        (("Pedestrian", "Person_sitting", "rider"), "ignored"),
-        (("cow", "traffic sign", ""), None),
-    ],
-)
-def test_labels_mean_the_same_in_any_spelling(labels: tuple[str, ...], role: str | None) -> None:
-    assert {DEFAULT_ROLES.role_of(label) for label in labels} == {role}
+ROLES: list[tuple[list[str], dict[Role | None, str]]] = [
+    (
+        [],
+        {
+            "vehicle": "Car, van, TRUCK, lorry, bus, vehicle, Pick-up, tuk-tuk, Motorbike, Cyclist",
+            "ignored": "DontCare, dont_care, Ignore region, Misc, trailer, Pedestrian, rider",
+            None: "cow, traffic sign, ",
+        },
+    ),
+    (
+        ["labels.roles={pedestrian: vehicle, tram: other, cow: ignored}"],
+        {"vehicle": "person, car", "other": "Tram", "ignored": "cow, misc, dont care"},
+    ),
+    (  # classes that the detector does not look for are ignored
+        ["detector.classes=[truck, tractor]"],
+        {"vehicle": "truck, tractor", "ignored": "car, bus, motorcycle, bicycle, person, vehicle"},
+    ),
+    (
+        ["detector.classes=[vehicle]"],
+        {"vehicle": "car, truck, bus, vehicle", "ignored": "motorcycle, bicycle, person"},
+    ),
+    (  # what the detector finds is no background
+        ["detector.classes=[car, bicycle]", "labels.roles={cyclist: other, person: other}"],
+        {"vehicle": "car", "ignored": "bicycle", "other": "person"},
+    ),
+]
 
 
-def test_settings_give_words_another_role_and_add_new_ones() -> None:
-    changes = ("pedestrian=vehicle", "tram=other", "cow=ignored")
-    roles = Roles.from_settings(load_settings((), [f"labels.roles.{change}" for change in changes]))
-    names = ("person", "Tram", "cow", "misc", "car", "dont care")
-    assert list(map(roles.role_of, names)) == [
-        *("vehicle", "other", "ignored"),
-        *("ignored", "vehicle", "ignored"),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("classes", "vehicles"),
-    [
-        (STANDARD_CLASSES, STANDARD_CLASSES),
-        (("car",), ("car",)),
-        (("truck", "tractor"), ("truck",)),
-    ],
-)
-def test_classes_that_the_detector_does_not_look_for_are_ignored(
-    classes: tuple[str, ...], vehicles: tuple[str, ...]
+@pytest.mark.parametrize(("assignments", "expected"), ROLES)
+def test_settings_give_each_word_its_role_in_any_spelling(
+    assignments: list[str], expected: dict[Role | None, str]
 ) -> None:
-    roles = Roles.of({}, classes)
-    assert {name: roles.role_of(name) for name in STANDARD_CLASSES} == {
-        name: "vehicle" if name in vehicles else "ignored" for name in STANDARD_CLASSES
-    }
-    assert all(roles.role_of(name) == "vehicle" for name in classes)
-
-
-def test_a_class_that_the_detector_finds_is_never_left_out() -> None:
-    changes = ['detector.classes=["car", "bicycle"]', "labels.roles.cyclist=other"]
-    roles = Roles.from_settings(load_settings((), [*changes, "labels.roles.person=other"]))
-    found = {word: roles.role_of(word) for word in ("car", "bicycle", "person")}
-    assert found == {"car": "vehicle", "bicycle": "ignored", "person": "other"}
-
-
-def test_a_detector_of_vehicles_looks_for_cars_trucks_and_buses() -> None:
-    settings = load_settings((), ['detector.classes=["vehicle"]'])
-    roles = Roles.from_settings(settings)
-    wanted = [name for name in STANDARD_CLASSES if roles.role_of(name) == "vehicle"]
-    assert wanted == ["car", "truck", "bus", "vehicle"]
+    roles = Roles.from_settings(load_settings((), assignments))
+    for role, words in expected.items():
+        assert {word: roles.role_of(word) for word in words.split(", ")} == dict.fromkeys(
+            words.split(", "), role
+        )
 
 
 @pytest.mark.parametrize(

@@ -38,27 +38,14 @@ def encoded(suffix: str, image: np.ndarray) -> bytes:
     return cv2.imencode(suffix, image)[1].tobytes()
 
 
-@pytest.mark.parametrize("suffix", [".png", ".bmp", ".tiff", ".PNG"])
-def test_a_written_picture_is_read_back_the_same(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"picture{suffix}"
-    path.write_bytes(encode_image(IMAGE, path))
-    np.testing.assert_array_equal(read_image(path), IMAGE)
-
-
-@pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".webp"])
-def test_a_compressed_picture_is_read_back_nearly_the_same(tmp_path: Path, suffix: str) -> None:
+@pytest.mark.parametrize("suffix", [".png", ".bmp", ".tiff", ".PNG", ".jpg", ".jpeg", ".webp"])
+def test_a_written_picture_is_read_back_the_same_or_compressed_nearly(
+    tmp_path: Path, suffix: str
+) -> None:
     path = tmp_path / f"picture{suffix}"
     path.write_bytes(encode_image(smooth(), path))
-    image = read_image(path)
-    assert image.dtype == np.uint8
-    np.testing.assert_allclose(image, smooth(), atol=12)
-
-
-def test_16_bit_values_are_rounded() -> None:
-    deep = np.array([[0, 128, 129, 65406, 65407, 65535]], np.uint16)
-    image = decode_image(encoded(".png", deep))
-    assert image is not None
-    assert image[0, :, 0].tolist() == [0, 0, 1, 254, 255, 255]
+    is_compressed = suffix in (".jpg", ".jpeg", ".webp")
+    np.testing.assert_allclose(read_image(path), smooth(), atol=12 if is_compressed else 0)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tiff"])
@@ -184,42 +171,26 @@ def make(folder: Path, *names: str) -> None:
         (folder / name).touch()
 
 
-def names_of(path: Path) -> list[str]:
-    return [file.name for file in numbered_images(path)]
-
-
 @pytest.mark.parametrize(
     ("pattern", "names", "others"),
     [
         ("a_%04d.png", ["a_0099.png", "a_0100.png"], ["a_0.png", "b_0001.png", "a_0050.jpg"]),
         ("%02d.png", ["98.png", "99.png", "100.png"], ["0101.png"]),
         ("7_%d.png", ["7_0.png", "7_3.png", "7_6.png"], ["7_05.png"]),
+        ("", ["0000000007.png", "0000000008.png"], ["notes.txt"]),
+        ("", ["9.jpg", "10.jpg"], [".11.jpg"]),
+        ("", ["cam 2_img_099.png", "cam 2_img_100.png"], []),
+        ("", ["100%_1_left.JPG"], []),
+        ("", ["7_0006.png", "7_0009.png", "7_0015.png"], ["cover.png"]),
+        ("", ["20260501_070001_400.jpg", "20260501_070003_0.jpg"], []),
+        ("", ["1_9.png", "1_10.png", "2_1.png"], []),
     ],
 )
-def test_a_pattern_names_its_pictures(
+def test_a_pattern_or_a_folder_has_its_numbered_pictures_in_order(
     pattern: str, names: list[str], others: list[str], tmp_path: Path
 ) -> None:
     make(tmp_path, *reversed(names), *others)
-    assert names_of(tmp_path / pattern) == names
-
-
-@pytest.mark.parametrize(
-    ("names", "others"),
-    [
-        (["0000000007.png", "0000000008.png"], ["notes.txt"]),
-        (["9.jpg", "10.jpg"], [".11.jpg"]),
-        (["cam 2_img_099.png", "cam 2_img_100.png"], []),
-        (["100%_1_left.JPG"], []),
-        (["7_0006.png", "7_0009.png", "7_0015.png"], ["cover.png"]),
-        (["20260501_070001_400.jpg", "20260501_070003_0.jpg"], []),
-        (["1_9.png", "1_10.png", "2_1.png"], []),
-    ],
-)
-def test_the_numbered_pictures_of_a_folder_are_found(
-    names: list[str], others: list[str], tmp_path: Path
-) -> None:
-    make(tmp_path, *reversed(names), *others)
-    assert names_of(tmp_path) == names
+    assert [file.name for file in numbered_images(tmp_path / pattern)] == names
 
 
 SEVERAL = "several kinds of names; use a pattern, as in img_%04d.png"

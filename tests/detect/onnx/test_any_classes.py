@@ -1,5 +1,6 @@
 """Networks of any number of classes work in every output."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,13 @@ FORMATS = (".txt", ".csv", ".jsonl", ".coco.json")
 GATE = "traffic: {lines: [{name: gate, start: [0.1, 0.5], end: [0.9, 0.5]}]}\n"
 
 
+def network_for(path: Path, box: RedBox, names: Sequence[str]) -> Path:
+    """Write a network of these classes that finds a box as red as the middle of its input."""
+    metadata = {"task": "detect", "names": str(dict(enumerate(names))), "imgsz": "[64, 128]"}
+    form = ultralytics((128, 64), box, len(names))
+    return write_network(path, form, (128, 64), (64, 32), metadata=metadata)
+
+
 @pytest.fixture
 def clip(tmp_path: Path) -> Path:
     """A second of a grey video with a red square in the middle."""
@@ -31,9 +39,7 @@ def test_a_vehicle_of_any_class_is_in_every_output(
     run: Run, clip: Path, tmp_path: Path, count: int
 ) -> None:
     names = [f"kind {number}" for number in range(count)]
-    form = ultralytics((128, 64), RedBox(64, 32, 16, 16, count - 1), count)
-    metadata = {"task": "detect", "names": str(dict(enumerate(names))), "imgsz": "[64, 128]"}
-    network = write_network(tmp_path / "net.onnx", form, (128, 64), (64, 32), metadata=metadata)
+    network = network_for(tmp_path / "net.onnx", RedBox(64, 32, 16, 16, count - 1), names)
     (tmp_path / "gate.yaml").write_text(GATE)
     tracks = [tmp_path / f"found{suffix}" for suffix in FORMATS]
     outputs = ("vehicles.json", "vehicles.csv", "counts.csv", "flows.csv", "page", "crops")
@@ -65,9 +71,8 @@ def test_the_minimum_score_of_an_image_and_the_maximum_height_depend_on_the_clas
     tmp_path: Path, name: str, x: int, size: tuple[int, int], is_shown: bool
 ) -> None:
     names = NetworkSettings().classes
-    form = ultralytics((128, 64), RedBox(x, 32, *size, names.index(name)), len(names))
-    metadata = {"task": "detect", "names": str(dict(enumerate(names))), "imgsz": "[64, 128]"}
-    network = write_network(tmp_path / "net.onnx", form, (128, 64), (64, 32), metadata=metadata)
+    box = RedBox(x, 32, *size, names.index(name))
+    network = network_for(tmp_path / "net.onnx", box, names)
     image = np.zeros((64, 128, 3), np.uint8)
     image[:, :, 2] = round(0.45 * 255)
     detector = NetworkModel(NetworkSettings(), network).for_video(128, 64, [])

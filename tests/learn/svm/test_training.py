@@ -1,7 +1,6 @@
 """The linear model is fitted, calibrated, and measured."""
 
 import json
-import logging
 import shutil
 import tracemalloc
 from collections.abc import Callable
@@ -255,10 +254,7 @@ def test_the_folded_model_gives_the_probabilities_of_scikit_learn() -> None:
     assert expected.std() > 0.2
     np.testing.assert_allclose(model.probabilities(vectors), expected, atol=1e-4)
     assert model.weights.shape == (1, 24)
-    assert model.biases.shape == model.slopes.shape == model.offsets.shape == (1,)
     assert model.features == FEATURES
-    kinds = {a.dtype for a in (model.weights, model.biases, model.slopes, model.offsets)}
-    assert kinds == {np.dtype(np.float32)}
 
 
 @pytest.mark.parametrize(("vehicles", "others"), [(2, 30), (30, 0)])
@@ -270,15 +266,14 @@ def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, ot
         fit(vectors, vehicle)
 
 
-@pytest.mark.parametrize("most", [1, 1000])
 def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, most: int
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vdet.learn.svm.training.MAX_ITERATIONS", most)
-    with caplog.at_level(logging.WARNING, "vdet"):
-        fit(*clouds(), penalty=1e6 if most == 1 else 0.01)
-    warning = "the SVM has not converged; lower train.svm.C"
-    assert (warning in caplog.text) is (most == 1)
+    fit(*clouds())
+    assert caplog.messages == []
+    monkeypatch.setattr("vdet.learn.svm.training.MAX_ITERATIONS", 1)
+    fit(*clouds(), penalty=1e6)
+    assert "the SVM has not converged; lower train.svm.C" in caplog.text
 
 
 def test_a_patch_and_the_samples_made_of_it_are_in_the_same_fold() -> None:
@@ -294,15 +289,6 @@ def test_a_patch_and_the_samples_made_of_it_are_in_the_same_fold() -> None:
     assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
 
 
-def peak_memory(call: Callable[[], object]) -> int:
-    """Return the bytes that `call` had at once."""
-    tracemalloc.start()
-    call()
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    return peak
-
-
 def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vdet.learn.svm.training.MAX_ITERATIONS", 5)
     rng = np.random.default_rng(0)
@@ -310,8 +296,10 @@ def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPa
     vectors = rng.normal(size=(7500, 768)).astype(np.float32)
     vehicle = (vectors[:, 0] > 0)[origins]
     rows = labelled(vectors, vehicle, origins)
-    settings = Settings(detector=SvmSettings())
-    peak = peak_memory(lambda: fit_rows(rows.of(np.ones(3000, bool)), settings))
+    tracemalloc.start()
+    fit_rows(rows.of(np.ones(3000, bool)), Settings(detector=SvmSettings()))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
     assert peak < 1.5 * vectors.nbytes
 
 
@@ -332,13 +320,6 @@ def fit_columns(hogs: Float32Array, sides: Float32Array, penalty: float) -> BoxR
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("vdet.learn.svm.training.PENALTY", penalty)
         return fit_sides(hogs.copy(), sides)
-
-
-def test_a_linear_map_is_found() -> None:
-    found = fit_columns(*scene(), penalty=1e-6)
-    np.testing.assert_allclose(found.weights, TRUE.weights, atol=0.01)
-    np.testing.assert_allclose(found.biases, TRUE.biases, atol=0.01)
-    assert found.weights.dtype == found.biases.dtype == np.float32
 
 
 def test_the_rows_in_which_a_side_is_unknown_do_not_count_for_it() -> None:
@@ -366,18 +347,12 @@ def test_a_feature_that_hardly_varies_gets_a_small_weight() -> None:
     assert abs(fit_columns(hogs, sides, penalty=0.1).weights[:, 0]).max() < 0.1
 
 
-TEST = Classification.of(
-    np.array([True, True, True, False, False]),
-    np.array([True, True, False, True, False]),
-    np.array(["a", "a", "b", "c", "c"]),
-)
-
-
 def test_patches_are_compared_by_class_and_by_group() -> None:
-    assert (
-        Classification(5, 0.6, 2 / 3, 2 / 3, [[2, 1], [1, 1]], {"a": 1.0, "b": 0.0, "c": 0.5})
-        == TEST
-    )
+    assert Classification.of(
+        np.array([True, True, True, False, False]),
+        np.array([True, True, False, True, False]),
+        np.array(["a", "a", "b", "c", "c"]),
+    ) == Classification(5, 0.6, 2 / 3, 2 / 3, [[2, 1], [1, 1]], {"a": 1.0, "b": 0.0, "c": 0.5})
     none = np.zeros(2, bool)
     without = Classification.of(none, none, np.array(["a", "a"]))
     assert (without.accuracy, without.precision, without.recall) == (1, None, None)
