@@ -58,7 +58,7 @@ def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> R
 def patches_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of generated patches, 160 of each class."""
     folder = tmp_path_factory.mktemp("patches")
-    write_patches(folder, seed=5, vehicles=160, non_vehicles=160)
+    write_patches(folder, seed=5, each=80)
     return folder
 
 

@@ -99,20 +99,6 @@ def test_a_module_imports_only_what_stands_below_its_room() -> None:
     assert upward == []
 
 
-def test_the_foundation_imports_nothing_of_vdet() -> None:
-    assert list(imports_of(NAMES["errors"])) == []
-
-
-def test_nothing_imports_the_command_line() -> None:
-    users = [
-        name
-        for name, path in NAMES.items()
-        if room_of(name) not in ("__main__", "cli")
-        and any(room_of(used) == "cli" for used in imports_of(path))
-    ]
-    assert users == []
-
-
 def test_no_modules_import_each_other_in_a_circle() -> None:
     graph = {name: set(imports_of(path)) - {name} for name, path in NAMES.items()}
     order = list(graphlib.TopologicalSorter(graph).static_order())  # CycleError names the circle

@@ -27,9 +27,6 @@ from vdet.media.reader import VideoReader
 pytestmark = pytest.mark.realdata
 
 
-DEFAULT = SvmSettings()
-
-
 @dataclass(frozen=True)
 class Shipped:
     """Settings that ship, and the model for them."""
@@ -44,14 +41,11 @@ class Shipped:
         return rounded(detector.detect(detector.search(picture, None)))
 
 
-def with_model(settings: SvmSettings) -> Shipped:
-    return Shipped(settings, load_model(shipped_model(settings)))
-
-
 @pytest.fixture(scope="module", params=["svm", "seed"])
 def shipped(real_data: Path, request: pytest.FixtureRequest) -> Shipped:
     assert real_data.is_dir()
-    return with_model(SEED.svm if request.param == "seed" else DEFAULT)
+    settings = SEED.svm if request.param == "seed" else SvmSettings()
+    return Shipped(settings, load_model(shipped_model(settings)))
 
 
 def frame(real_data: Path, index: int) -> Picture:
@@ -90,29 +84,15 @@ def test_the_shipped_model_classifies_the_last_patches_of_every_folder(
     assert np.mean(predicted == [file.vehicle for file in chosen]) >= 0.95
 
 
-@pytest.mark.parametrize("index", [24, 74])
-def test_nothing_is_found_on_an_empty_road(real_data: Path, shipped: Shipped, index: int) -> None:
-    assert shipped.find(frame(real_data, index)) == []
-
-
-@pytest.mark.parametrize(
-    ("index", "car"), [(299, Box.sized(1005, 406, 214, 102)), (499, Box.sized(892, 406, 122, 67))]
-)
-def test_the_white_car_is_found(real_data: Path, shipped: Shipped, index: int, car: Box) -> None:
-    assert any(is_on(box, car) for box in shipped.find(frame(real_data, index)))
-
-
-def test_the_white_car_is_found_in_a_photograph(real_data: Path, shipped: Shipped) -> None:
+def test_the_white_car_is_found_in_stills_and_nothing_on_an_empty_road(
+    real_data: Path, shipped: Shipped
+) -> None:
+    for index in (24, 74):
+        assert shipped.find(frame(real_data, index)) == []
+    for index, car in (299, Box.sized(1005, 406, 214, 102)), (499, Box.sized(892, 406, 122, 67)):
+        assert any(is_on(box, car) for box in shipped.find(frame(real_data, index)))
     (box,) = shipped.find(Picture(read_image(real_data / "test_images" / "test3.jpg")))
     assert is_on(box, Box.sized(873, 416, 88, 53))
-
-
-def test_the_seed_finds_the_white_and_the_black_car_apart(real_data: Path) -> None:
-    boxes = with_model(SEED.svm).find(frame(real_data, 752))
-    white = [box for box in boxes if is_on(box, Box.sized(876, 414, 87, 51))]
-    black = [box for box in boxes if is_on(box, Box.sized(949, 403, 302, 164))]
-    assert (len(white), len(black)) == (1, 1)
-    assert white != black
 
 
 @pytest.mark.parametrize("config", ["default", "svm", "seed"])
@@ -143,19 +123,16 @@ def test_both_cars_are_followed_through_the_video(
     run("detect-video", real_data / "project_video.mp4", *options, code=0)
     records = [json.loads(line) for line in (tmp_path / "tracks.jsonl").read_text().splitlines()]
     assert [record["frame"] for record in records] == list(range(first, first + count))
-    places = {
-        "white": Box.sized(874, 414, 87, 52),
-        "black": Box.sized(950, 403, 309, 168),
-    }  # at the end
-    followed: dict[str, set[int]] = {car: set() for car in places}
-    for record in records[-5:]:
-        for track in record["tracks"]:
-            box = Box.sized(*(track[key] for key in ("x", "y", "width", "height")))
-            for car, place in places.items():
-                if is_on(box, place):
-                    followed[car].add(track["id"])
-    assert all(len(ids) == 1 for ids in followed.values()), followed
-    assert followed["white"].isdisjoint(followed["black"])
+    white, black = (
+        {
+            track["id"]
+            for record in records[-5:]
+            for track in record["tracks"]
+            if is_on(Box.sized(*(track[key] for key in ("x", "y", "width", "height"))), place)
+        }
+        for place in (Box.sized(874, 414, 87, 52), Box.sized(950, 403, 309, 168))  # at the end
+    )
+    assert (len(white), len(black), white & black) == (1, 1, set())
 
 
 @pytest.mark.parametrize(

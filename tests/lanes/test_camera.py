@@ -5,7 +5,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-import yaml
 
 from lanes.chessboards import CAMERA
 from vdet.boxes import Box
@@ -15,7 +14,6 @@ from vdet.errors import ConfigError
 from vdet.lanes.camera import Undistorter, save_camera
 
 MATRIX = CAMERA.matrix
-GOOD = CAMERA.model_dump(mode="json")
 
 
 @pytest.fixture(scope="module")
@@ -75,35 +73,7 @@ def test_without_distortion_nothing_changes(camera: LensSettings | None) -> None
     assert undistorter.points(np.array([[3.0, 5.0]])) == pytest.approx(np.array([[3.0, 5.0]]))
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "camera.yaml"
-
-
-def refusal(path: Path, values: object) -> str:
-    text = yaml.safe_dump({"camera": {"lens": values}}, sort_keys=False)
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError) as error:
-        load_settings([path])
-    return str(error.value).replace(str(path), "camera.yaml")
-
-
-def test_a_camera_is_read_with_all_its_digits(path: Path) -> None:
+def test_a_camera_is_read_with_all_its_digits(tmp_path: Path) -> None:
     camera = CAMERA.model_copy(update={"distortion": (-1 / 3, 0.1, 1e-9, -7 / 11, 0.0)})
-    save_camera(camera, path)
-    assert load_settings([path]).camera.lens == camera
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "message"),
-    [
-        ("size", ["wide", 480], "camera.yaml:4:7: camera.lens.size[0]: must be a valid integer"),
-        ("matrix", [[1, 2], [3, 4]], "camera.yaml:7:7: camera.lens.matrix[0][2]: is required"),
-        ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: must be a finite number"),
-        ("colour", "red", "camera.lens.colour: unknown setting"),
-    ],
-)
-def test_each_mistake_is_named_with_its_place(
-    path: Path, key: str, value: object, message: str
-) -> None:
-    assert message in refusal(path, GOOD | {key: value})
+    save_camera(camera, tmp_path / "camera.yaml")
+    assert load_settings([tmp_path / "camera.yaml"]).camera.lens == camera

@@ -19,7 +19,6 @@ from vdet.media.reader import VideoReader
 from vdet.synthetic import (
     NEAR,
     STANDS,
-    PinholeCamera,
     Renderer,
     Scene,
     Shadow,
@@ -174,19 +173,6 @@ def test_truth_is_in_the_columns_of_motchallenge_with_what_is_hidden_or_small_ig
 
 
 metres = st.floats(-50, 50)
-
-
-def test_projection_is_that_of_a_pinhole() -> None:
-    camera = PinholeCamera(800, 600, focal=1000, horizon=300, above_ground=1.2)
-    [[u, v]] = camera.project(np.array([[2.0, 0.0, 20.0]]))
-    assert (u, v) == pytest.approx((400 + 1000 * 2 / 20, 300 + 1000 * 1.2 / 20))
-
-
-def test_a_right_hand_bend_moves_the_road_by_half_its_curvature_times_distance_squared() -> None:
-    straight, bent = (PinholeCamera.dashboard(1280, 720, curvature) for curvature in (0.0, 1 / 500))
-    point = np.array([[1.0, 0.0, 40.0]])
-    moved = straight.project(point + np.array([40.0**2 / 2 / 500, 0, 0]))
-    assert bent.project(point) == pytest.approx(moved)
 
 
 @given(st.lists(st.tuples(metres, metres, metres), min_size=3, max_size=6))

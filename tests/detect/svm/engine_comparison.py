@@ -2,12 +2,13 @@
 
 import functools
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 from benchmarks.searches import PatchSearch
 
-from drawn_patches import draw_patches
+from drawn_patches import GROUPS, draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
 from vdet.config.kinds import FeatureSettings, WindowSettings
@@ -19,7 +20,7 @@ from vdet.synthetic import Renderer, demo_scene
 Exact = npt.NDArray[np.float64]
 
 SEED_FEATURES = SEED.svm.features
-_EACH = 120  # patches of each class
+_EACH = 60  # patches of each group
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +106,8 @@ def _ridge(vectors: Exact, targets: Exact) -> tuple[Exact, Exact]:
 @functools.cache
 def _patches() -> tuple[list[Image], Float32Array]:
     rng = np.random.default_rng(1)
-    drawn = (draw_patches(_EACH, rng, vehicles=vehicles) for vehicles in (True, False))
-    patches = [patch for samples in drawn for _, patch in samples]
-    return patches, np.repeat(np.array([1, -1], np.float32), _EACH)
+    patches = [patch for group in GROUPS for patch in islice(draw_patches(group, rng), _EACH)]
+    return patches, np.repeat(np.array([1, 1, -1, -1], np.float32), _EACH)
 
 
 @functools.cache
