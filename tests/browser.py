@@ -77,11 +77,6 @@ class Browser:
             time.sleep(0.05)
         return found
 
-    def show_print(self) -> None:
-        """Lay the page out as on paper."""
-        values = {"cmd": "Emulation.setEmulatedMedia", "params": {"media": "print"}}
-        self._call("POST", f"{self._session}/goog/cdp/execute", values)
-
     def text(self, selector: str) -> str:
         """Return the text of an element."""
         return str(self.run("return document.querySelector(arguments[0]).textContent", selector))

@@ -18,18 +18,6 @@ def process_of(_: int) -> int:
     return os.getpid()
 
 
-def kill_process(folder: Path, number: int) -> int:
-    """Kill the process at item 3 always, and at item 2 once, when item 1 has ended."""
-    if number == 2 and not (folder / "killed").exists():
-        until((folder / "1").exists)
-        (folder / "killed").touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    if number == 3:
-        os.kill(os.getpid(), signal.SIGKILL)
-    (folder / str(number)).touch()
-    return number
-
-
 def end_after_item_1_began(folder: Path, number: int) -> int:
     """End item 0 when item 1 is in work; the other items do not end."""
     (folder / str(number)).write_text(str(os.getpid()))
@@ -42,11 +30,6 @@ def test_items_are_called_once_in_other_processes() -> None:
     assert [item for item, _ in results] == [0, 1, 2, 3]
     assert os.getpid() not in {process for _, process in results}
     assert list(call_all(process_of, [], LocalProcesses(1))) == []
-
-
-def test_only_items_that_always_kill_their_process_have_no_result(tmp_path: Path) -> None:
-    results = dict(call_all(partial(kill_process, tmp_path), range(6), LocalProcesses(2)))
-    assert results == {number: None if number == 3 else number for number in range(6)}
 
 
 def test_an_error_of_the_function_is_raised() -> None:

@@ -128,13 +128,6 @@ class TestLabel:
     def test_text_is_dark_on_bright_tags_and_bright_on_dark_ones(self) -> None:
         assert [text_color(color) for color in (GREEN, WHITE, BLACK)] == [BLACK, BLACK, WHITE]
 
-    def test_stands_above_its_box_where_there_is_room(self) -> None:
-        image, box = blank(), Box.sized(100, 100, 60, 60)
-        draw_box(image, box, GREEN, "#12")
-        above = touched(image) & ~covered(box, image)
-        assert above[80:100, 100:160].any()
-        assert not above[101:].any()
-
 
 def test_neighbouring_ids_differ_clearly() -> None:
     colors = [np.array(color_of(number)) for number in range(100)]

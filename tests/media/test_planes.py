@@ -1,5 +1,7 @@
 """Pictures as planes: which decoded ones come so, and how an image becomes planes."""
 
+from typing import Literal
+
 import av
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +13,9 @@ from vdet.boxes import Box, Image
 from vdet.media.frame import Coding, Picture, Planes
 
 
-def decoded(
-    pixels: str = "yuv420p", *, matrix: int = 2, full_range: bool = False, side: int = 32
-) -> av.VideoFrame:
+def decoded(pixels: str, *, matrix: int, full_range: bool) -> av.VideoFrame:
     """Return a picture as a decoder gives it: of a pixel format, with its tags."""
-    grey = np.full((side, side, 3), 90, np.uint8)
+    grey = np.full((32, 32, 3), 90, np.uint8)
     picture = av.VideoFrame.from_ndarray(grey, format="bgr24").reformat(format=pixels)
     picture.colorspace = matrix
     picture.color_range = ColorRange.JPEG if full_range else ColorRange.MPEG
@@ -29,27 +29,24 @@ def slopes(width: int, height: int) -> Image:
     return np.stack(layers, axis=-1).astype(np.uint8)
 
 
-class TestCoding:
-    @pytest.mark.parametrize("full_range", [False, True])
-    @pytest.mark.parametrize(
-        ("matrix", "name"), [(1, "bt709"), (2, "bt601"), (5, "bt601"), (6, "bt601")]
-    )
-    def test_is_the_one_that_the_tags_name(
-        self, matrix: int, name: str, *, full_range: bool
-    ) -> None:
-        found = Coding.of(decoded(matrix=matrix, full_range=full_range))
-        assert found is not None
-        assert (found.matrix, found.full_range) == (name, full_range)
+OTHER_FORMS = ("yuv444p", "yuvj444p", "yuv422p", "yuv420p10le", "nv12", "gray", "bgr24")
 
-    @pytest.mark.parametrize(
-        "pixels", ["yuv444p", "yuvj444p", "yuv422p", "yuv420p10le", "nv12", "gray", "bgr24"]
-    )
-    def test_other_forms_of_pixels_have_none(self, pixels: str) -> None:
-        assert Coding.of(decoded(pixels)) is None
 
-    @pytest.mark.parametrize("matrix", [4, 7, 9, 10])
-    def test_other_matrices_have_none(self, matrix: int) -> None:
-        assert Coding.of(decoded(matrix=matrix)) is None
+@pytest.mark.parametrize("full_range", [False, True])
+@pytest.mark.parametrize(
+    ("pixels", "matrix", "name"),
+    [
+        *(("yuv420p", matrix, "bt601") for matrix in (2, 5, 6)),
+        ("yuv420p", 1, "bt709"),
+        *(("yuv420p", matrix, None) for matrix in (4, 7, 9, 10)),
+        *((pixels, 2, None) for pixels in OTHER_FORMS),
+    ],
+)
+def test_planes_have_the_coding_that_their_tags_name_and_other_forms_none(
+    pixels: str, matrix: int, name: Literal["bt601", "bt709"] | None, *, full_range: bool
+) -> None:
+    found = Coding.of(decoded(pixels, matrix=matrix, full_range=full_range))
+    assert found == (Coding(name, full_range=full_range) if name else None)
 
 
 @in_any_coding
@@ -67,23 +64,23 @@ def test_a_copy_has_the_same_values_and_coding_in_memory_of_its_own(coding: Codi
         np.testing.assert_array_equal(layer, expected)
 
 
-class TestOfImage:
-    @in_any_coding
-    def test_an_odd_side_grows_by_its_last_row_or_column(self, coding: Coding) -> None:
-        image = np.zeros((5, 7, 3), np.uint8)
-        image[4:, :] = image[:, 6:] = 200
-        luma = Planes.of_image(image, coding).luma
-        assert luma.shape == (6, 8)
-        assert (luma[5] == luma[4]).all()
-        assert (luma[:, 7] == luma[:, 6]).all()
-        assert luma[5, 7] > luma[0, 0]
+@in_any_coding
+def test_an_odd_side_grows_by_its_last_row_or_column(coding: Coding) -> None:
+    image = np.zeros((5, 7, 3), np.uint8)
+    image[4:, :] = image[:, 6:] = 200
+    luma = Planes.of_image(image, coding).luma
+    assert luma.shape == (6, 8)
+    assert (luma[5] == luma[4]).all()
+    assert (luma[:, 7] == luma[:, 6]).all()
+    assert luma[5, 7] > luma[0, 0]
 
-    @in_any_coding
-    def test_a_picture_is_the_same_as_planes_and_back(self, coding: Coding) -> None:
-        image = slopes(96, 64)
-        difference = np.abs(Planes.of_image(image, coding).to_image().astype(int) - image)
-        assert difference.max() <= 9
-        assert difference.mean() < 2.5
+
+@in_any_coding
+def test_a_picture_is_the_same_as_planes_and_back(coding: Coding) -> None:
+    image = slopes(96, 64)
+    difference = np.abs(Planes.of_image(image, coding).to_image().astype(int) - image)
+    assert difference.max() <= 9
+    assert difference.mean() < 2.5
 
 
 def exact_image(planes: Planes) -> npt.NDArray[np.float64]:

@@ -19,7 +19,6 @@ from vdet.config.schema import InputSettings, OutputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame
 from vdet.media.frame import Coding, ColorTags
-from vdet.media.images import Orientation
 from vdet.media.reader import Damage, Decoder, VideoReader, next_time
 from vdet.media.writer import VideoWriter
 
@@ -93,29 +92,6 @@ def test_frames_from_start_to_before_end(
     assert [frame.index for frame in read] == list(expected)
     assert [read_number(frame.image) for frame in read] == list(expected)
     assert [frame.time for frame in read] == [Fraction(index, 25) for index in expected]
-
-
-def set_matrix(path: Path, a: float, b: float, c: float, d: float) -> Path:
-    """Set what becomes of x (a, b) and of y (c, d) in the track header of an MP4 file."""
-    data = bytearray(path.read_bytes())
-    place = data.index(b"tkhd") + 44
-    values = [round(value * 65_536) for value in (a, b, 0, c, d, 0, 0, 0)]
-    struct.pack_into(">9i", data, place, *values, 1 << 30)
-    path.write_bytes(data)
-    return path
-
-
-@pytest.mark.parametrize("turns", range(4))
-def test_all_quarter_turns_are_upright(turns: int, tmp_path: Path) -> None:
-    path = write_clip(tmp_path / "clip.mp4", count=1)
-    with VideoReader(path) as reader:
-        stored = next(iter(reader)).image
-    matrix = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turns)
-    with VideoReader(set_matrix(path, *matrix.ravel() * 0.5)) as reader:
-        image = next(iter(reader)).image
-        assert reader.info.orientation == Orientation(turns * 90)
-        assert image.shape == (reader.info.height, reader.info.width, 3)
-    np.testing.assert_array_equal(image, np.rot90(stored, turns))
 
 
 def test_other_video_streams_are_reported(tmp_path: Path, warnings: Warnings) -> None:

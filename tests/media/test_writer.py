@@ -260,14 +260,6 @@ def test_sound_that_mp4_cannot_hold_is_encoded(
     assert warnings() == []
 
 
-def test_every_sound_stream_is_copied(tmp_path: Path) -> None:
-    source = write_clip(tmp_path / "in.mkv", sounds=["aac", "libmp3lame"])
-    target = copy(source, tmp_path / "out.mkv")
-    for track in (0, 1):
-        kept = [packet for packet in sound_of(source, track) if packet[0] >= 0]
-        assert_same(sound_of(target, track), kept)
-
-
 def test_damaged_sound_does_not_affect_the_picture(tmp_path: Path, warnings: Warnings) -> None:
     source = write_clip(tmp_path / "in.ts", sounds=["aac"], count=50)
     data = bytearray(source.read_bytes())

@@ -1,9 +1,6 @@
-import pytest
-
 from boxing import moved_to
 from seed import SEED
 from vdet.boxes import NO_BOXES, Box, Boxes
-from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.schema import Settings
 from vdet.media import Picture
 from vdet.track.motion.tracker import MotionTracker
@@ -16,13 +13,6 @@ def test_the_kind_decides_which_tracker_it_is() -> None:
     rules = make_tracker(SEED, 1280, 720)
     assert isinstance(rules, InterpolatingTracker)
     assert isinstance(rules.tracker, RulesTracker)
-
-
-def test_the_lengths_of_the_rules_are_scaled_to_the_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[RulesTrackerSettings] = []
-    monkeypatch.setattr(RulesTracker, "__init__", lambda _, settings: made.append(settings))
-    make_tracker(SEED, 640, 360)
-    assert (made[0].min_region, made[0].max_distance) == (25, 25)
 
 
 CAR = Box.sized(100, 100, 50, 40)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import onnx
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, helper, numpy_helper, parser
 
 Array = npt.NDArray[np.float32]
 
@@ -73,6 +73,20 @@ def final(box: RedBox, rows: int = 300) -> Form:
     return Form(table, 2, 4)
 
 
+NETWORK = """
+<ir_version: 8, opset_import: ["" : 17]>
+detector (float[{batch}, 3, {height}, {width}] images) => (float[] output0)
+<int64[3] first = {{0, {y}, {x}}}, int64[3] end = {{1, {below}, {beside}}},
+ int64[3] axes = {{1, 2, 3}}, int64[3] cube = {{1, 1, 1}}>
+{{
+    value = Slice (images, first, end, axes)
+    red = Reshape (value, cube)
+    score = Mul (red, hot)
+    output0 = Add (table, score)
+}}
+"""
+
+
 def write_network(
     path: Path,
     form: Form,
@@ -83,40 +97,16 @@ def write_network(
     batch: int = 1,
 ) -> Path:
     """Write a network with one input of `size` whose score is the red of `pixel` of the input."""
-    width, height = size
-    nodes, constants = _redness("images", pixel)
+    (width, height), (x, y) = size, pixel
+    text = NETWORK.format(
+        batch=batch, height=height, width=width, x=x, y=y, below=y + 1, beside=x + 1
+    )
+    model = parser.parse_model(text)
     hot = np.zeros((1, *form.table.shape), np.float32)
     hot[0, form.score_row, form.score_column] = 1
-    constants += [_constant(hot, "hot"), _constant(form.table[np.newaxis], "table")]
-    nodes += [
-        helper.make_node("Mul", ["red", "hot"], ["score"]),
-        helper.make_node("Add", ["table", "score"], ["output0"]),
-    ]
-    inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [batch, 3, height, width])]
-    outputs = [helper.make_tensor_value_info("output0", TensorProto.FLOAT, None)]
-    return write_graph(path, nodes, inputs, outputs, constants, metadata)
-
-
-def _redness(
-    name: str, pixel: tuple[int, int]
-) -> tuple[list[onnx.NodeProto], list[onnx.TensorProto]]:
-    """Return the nodes that make `red`: the red of a pixel of an input, `(1, 1, 1)`."""
-    x, y = pixel
-    constants = [
-        _constant(np.array([0, y, x], np.int64), "first"),
-        _constant(np.array([1, y + 1, x + 1], np.int64), "end"),
-        _constant(np.array([1, 2, 3], np.int64), "axes"),
-        _constant(np.array([1, 1, 1], np.int64), "cube"),
-    ]
-    nodes = [
-        helper.make_node("Slice", [name, "first", "end", "axes"], ["value"]),
-        helper.make_node("Reshape", ["value", "cube"], ["red"]),
-    ]
-    return nodes, constants
-
-
-def _constant(values: npt.NDArray[np.generic], name: str) -> onnx.TensorProto:
-    return numpy_helper.from_array(values, name)
+    for name, values in (("hot", hot), ("table", form.table[np.newaxis])):
+        model.graph.initializer.append(numpy_helper.from_array(values, name))
+    return _save(path, model, metadata)
 
 
 def write_with_weights_elsewhere(path: Path, location: str) -> Path:
@@ -142,6 +132,10 @@ def write_graph(
     """Write a network of any graph."""
     graph = helper.make_graph(nodes, "detector", inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[OPSET], ir_version=IR_VERSION)
+    return _save(path, model, metadata)
+
+
+def _save(path: Path, model: onnx.ModelProto, metadata: Mapping[str, str] | None) -> Path:
     if metadata:
         helper.set_model_props(model, dict(metadata))
     path.write_bytes(model.SerializeToString())

@@ -53,25 +53,15 @@ def test_strokes_run_along_edges_and_bars_count_pixels() -> None:
     assert np.count_nonzero(bars[:128].any(axis=(0, 2))) == 2 * len(bars) // features.histogram.bins
 
 
-class TestHeat:
-    def test_heat_is_white_at_its_peak_and_red_below(self) -> None:
-        heat = Heat(np.zeros((24, 32), np.float32))
-        heat.values[5, 7], heat.values[9, 9] = 8.0, 2.0
-        blended = blend_heat(np.zeros((24, 32, 3), np.uint8), heat)
-        assert blended[5, 7].min() > 190
-        blue, green, red = blended[9, 9].tolist()
-        assert red > 100 > green == blue == 0
-        assert blended[0, 0].max() < 12
-
-    @pytest.mark.parametrize("shrink", [1, 4])
-    def test_heat_of_a_shrunk_map_lies_in_its_place(self, shrink: int) -> None:
-        values = np.zeros((-(-21 // shrink), -(-30 // shrink)), np.float32)
-        values[1, 2] = 5
-        blended = blend_heat(np.zeros((21, 30, 3), np.uint8), Heat(values, shrink))
-        assert blended.shape == (21, 30, 3)
-        rows, columns = np.nonzero(blended.min(axis=2) > 190)
-        assert set(rows.tolist()) == set(range(shrink, min(21, 2 * shrink)))
-        assert set(columns.tolist()) == set(range(2 * shrink, min(30, 3 * shrink)))
+@pytest.mark.parametrize("shrink", [1, 4])
+def test_heat_of_a_shrunk_map_lies_in_its_place(shrink: int) -> None:
+    values = np.zeros((-(-21 // shrink), -(-30 // shrink)), np.float32)
+    values[1, 2] = 5
+    blended = blend_heat(np.zeros((21, 30, 3), np.uint8), Heat(values, shrink))
+    assert blended.shape == (21, 30, 3)
+    rows, columns = np.nonzero(blended.min(axis=2) > 190)
+    assert set(rows.tolist()) == set(range(shrink, min(21, 2 * shrink)))
+    assert set(columns.tolist()) == set(range(2 * shrink, min(30, 3 * shrink)))
 
 
 def test_what_is_not_hot_enough_is_darkened() -> None:

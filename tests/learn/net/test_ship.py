@@ -12,15 +12,8 @@ torch = pytest.importorskip(
 
 from benchmarks.ship import ship  # noqa: E402
 
-from vdet.detect.onnx.network import (  # noqa: E402
-    Header,
-    ScoreCalibration,
-    Session,
-)
-from vdet.learn.net.network import (  # noqa: E402
-    Network,
-    export_network,
-)
+from vdet.detect.onnx.network import Header, ScoreCalibration, Session  # noqa: E402
+from vdet.learn.net.network import Network, export_network  # noqa: E402
 
 OLD, NEW = ("car", "truck"), ("car", "truck", "other vehicle")
 STEEP = ScoreCalibration(slope=2.0, offset=0.5)
@@ -58,10 +51,8 @@ def test_the_mean_lies_between_the_base_and_the_network(networks: tuple[Path, Pa
     np.testing.assert_allclose(cells(output)[..., :7], cells(base), atol=1e-4)
     header = ship(new, None, base, base, share=0.75)  # replaces the base
     assert header.by_class == {"car": STEEP}
-    assert (
-        header.provenance["average"]
-        == "0.75 of the weights after these steps, and 0.25 of the base"
-    )
+    words = "0.75 of the weights after these steps, and 0.25 of the base"
+    assert header.provenance["average"] == words
 
 
 def test_a_synonym_is_calibrated_by_the_results_of_our_class(networks: tuple[Path, Path]) -> None:

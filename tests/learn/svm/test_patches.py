@@ -76,15 +76,6 @@ def test_other_files_than_patches_are_skipped(tmp_path: Path, make: Maker) -> No
     assert listed(make(tmp_path / "set", [*BOTH, *junk])) == BOTH[::-1]
 
 
-def test_patches_are_read_in_the_order_given(tmp_path: Path) -> None:
-    folder = make_folder(tmp_path / "folder", BOTH)
-    files = find_patches([folder, make_zip(tmp_path / "set.zip", BOTH)])
-    patches = list(read_patches(files))
-    assert len(patches) == len(files)
-    for image in patches:
-        np.testing.assert_array_equal(image, PATCH)
-
-
 def test_a_broken_patch_has_no_image_and_the_others_are_read(tmp_path: Path) -> None:
     make_folder(tmp_path, [*BOTH, "vehicles/far/2.png", "vehicles/far/3.png"])
     (tmp_path / "vehicles/far/1.png").write_bytes(PNG[:30])

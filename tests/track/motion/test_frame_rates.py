@@ -7,7 +7,7 @@ import pytest
 
 from boxing import moved_to
 from track.motion.scenes import WIDTH, detections, follow, ids, inside
-from track.motion.traffic import PERFECT, Noise, RoadVehicle, random_traffic, track_scores, truth_at
+from track.motion.traffic import PERFECT, SECONDS, Noise, driving, random_traffic, track_scores
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
@@ -72,19 +72,17 @@ def test_a_vehicle_keeps_its_id_through_a_short_gap_in_the_video(gap: float, id_
 
 # Traffic
 
-SECONDS = 10.0
 OVERTAKING = (
-    RoadVehicle(0, 25.0, 0.2),
-    RoadVehicle(1, 32.0, -2.0),
-    RoadVehicle(-1, 8.0, 3.0, height=1.9),
-    RoadVehicle(2, 12.0, 2.0),
+    driving(1, lane=0, ahead=25, speed=0.2),
+    driving(2, lane=1, ahead=32, speed=-2),
+    driving(3, lane=-1, ahead=8, speed=3),
+    driving(4, lane=2, ahead=12, speed=2),
 )
 
 
 @every_rate
 def test_perfect_detections_give_each_vehicle_one_id(rate: int) -> None:
-    clip = [truth_at(OVERTAKING, n / rate) for n in range(int(SECONDS * rate))]
-    scores = track_scores(clip, rate, PERFECT)
+    scores = track_scores(OVERTAKING, rate, PERFECT)
     assert (scores.tracks, scores.id_switches, scores.delays.count(None)) == (4, 0, 0)
     assert scores.precision == 1
     assert scores.recall > 1 - 2.5 / (SECONDS * min(rate, 10))
@@ -93,9 +91,7 @@ def test_perfect_detections_give_each_vehicle_one_id(rate: int) -> None:
 
 @cache
 def noisy_traffic(seed: int, rate: int, stride: int = 1) -> Scores:
-    vehicles = random_traffic(seed, SECONDS, fastest=12)
-    clip = [truth_at(vehicles, n / rate) for n in range(int(SECONDS * rate))]
-    return track_scores(clip, rate, Noise(), seed, stride=stride)
+    return track_scores(random_traffic(seed, fastest=12), rate, Noise(), seed, stride=stride)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -116,8 +112,8 @@ def test_traffic_is_followed_alike_at_other_rates_and_where_few_frames_are_searc
 
 @every_rate
 def test_many_weak_false_detections_do_not_become_tracks(rate: int) -> None:
-    clip = [truth_at(OVERTAKING, n / rate) for n in range(int(SECONDS * rate))]
-    scores = track_scores(clip, rate, Noise(sides=0.03, missed=0.03, false=2.0, surest=0.4))
+    noise = Noise(sides=0.03, missed=0.03, false=2.0, surest=0.4)
+    scores = track_scores(OVERTAKING, rate, noise)
     assert scores.false_tracks == 0
     assert scores.id_switches == 0
     assert scores.f1 > 0.93
