@@ -19,6 +19,7 @@ NTSC = Fraction(30_000, 1001)
 UNEVEN = [Fraction(ms, 1000) for ms in (0, 40, 50, 90, 300, 301, 340, 1340, 1341, 1400)]
 MILLISECOND = Fraction(1, 1000)
 B_FRAMES = {"bf": "3", "b-adapt": "0"}
+NEGATIVE_TIMES = {"avoid_negative_ts": "disabled"}
 
 ODD: dict[str, tuple[str, dict[str, Any]]] = {
     "constant rate": ("mp4", {}),
@@ -31,14 +32,8 @@ ODD: dict[str, tuple[str, dict[str, Any]]] = {
     "b-frames": ("mp4", {"options": B_FRAMES, "count": 30}),
     "no b-frames": ("mp4", {"options": {"bf": "0"}}),
     "b-frames, no edit list": ("mp4", {"options": B_FRAMES, "muxing": {"use_editlist": "0"}}),
-    "b-frames, negative offsets": (
-        "mp4",
-        {"options": B_FRAMES, "movflags": "+negative_cts_offsets"},
-    ),
-    "negative first time": (
-        "mkv",
-        {"begin": Fraction(-3, 25), "muxing": {"avoid_negative_ts": "disabled"}},
-    ),
+    "negative offsets": ("mp4", {"options": B_FRAMES, "movflags": "+negative_cts_offsets"}),
+    "negative first time": ("mkv", {"begin": Fraction(-3, 25), "muxing": NEGATIVE_TIMES}),
     "first time not 0": ("ts", {}),
     "first time an hour late": ("mkv", {"begin": Fraction(3600)}),
     "b-frames in avi": ("avi", {"options": B_FRAMES, "count": 30, "sounds": ["libmp3lame"]}),

@@ -132,10 +132,7 @@ class TestBoxes:
             ({"ids": [1]}, r"ids: has shape \(1,\)"),
             ({"data": {"strength": [1]}}, r"strength: has shape \(1,\)"),
             ({"scores": [0, 1, np.nan]}, "scores: a value is not a finite number"),
-            (
-                {"sides": [*SIDES[:2], [5, 5, 5, 9]]},
-                "sides: .* no area; must be x1 < x2 and y1 < y2",
-            ),
+            ({"sides": [*SIDES[:2], [5, 5, 5, 9]]}, "sides: .* no area; must be x1 < x2 and y1"),
             ({"scores": [0, 1, 1.01]}, "scores: must be from 0 to 1"),
             ({"classes": [0, 1, 2]}, "classes: an index is not in `names`"),
             ({"data": {"class_scores": [[1]] * 3}}, "class_scores: must have a column for each"),

@@ -162,10 +162,7 @@ class TestOtherPackages:
     @pytest.mark.parametrize(
         ("assignment", "words"),
         [
-            (
-                "level=9",
-                r"\.level: unknown setting of detector\.kind: net; known settings: kind, .*",
-            ),
+            ("level=9", r"\.level: unknown setting of detector\.kind: net; known settings: .*"),
             ("kind=best", ": best: .* known: net, svm, broken, fake, missing$"),
             ("kind=broken", r": broken: fake_vdet:NOTHING cannot be loaded \(AttributeError: .*"),
             ("kind=missing", r": missing: no_such.* cannot be loaded \(ModuleNotFoundError: .*"),

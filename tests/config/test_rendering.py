@@ -18,9 +18,7 @@ KINDS = {
     "svm": SVM,
     "rules": Settings(tracker=RulesTrackerSettings()),
     "seed": SEED,
-    "changed": load_settings(
-        (), ["draw.label=[]", "detector.kind=svm", "detector.heat.votes=null"]
-    ),
+    "changed": load_settings((), ["draw.label=[]", "detector={kind: svm, heat: {votes: null}}"]),
 }
 """Settings in which every kind of detector and every kind of tracker occurs."""
 

@@ -121,27 +121,18 @@ def test_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
     assert 8 < sum(trial.code == 0 for trial in trials) < 100
 
 
-def bombs() -> dict[str, tuple[bytes, str]]:
+def bombs() -> dict[str, tuple[dict[str, bytes], str]]:
     whole = members()
     billion = npy_header("<f4", "(1, 1000000000)")
-    many = FEATURES.model_dump(mode="json") | {
-        "patch": 256,
-        "halved": [],
-        "hog": {"orientations": 32, "cell": 2, "block": 8},
-    }
+    hog = {"orientations": 32, "cell": 2, "block": 8}
+    many = FEATURES.model_dump(mode="json") | {"patch": 256, "halved": [], "hog": hog}
     asking = json.dumps(json.loads(HEADER) | {"features": many})
     damaged = "is not a vdet model, or is damaged"
     return {
-        "a billion features, claimed": (zipped(whole | {"weights": billion + bytes(100)}), damaged),
-        "a billion features, packed": (
-            zipped(whole | {"weights": billion + bytes(65_000_000)}),
-            "is too large",
-        ),
-        "ninety million features, asked for": (
-            zipped(members(asking)),
-            r"its weights are damaged, or not of shape \(1, 89\d{6}\)",
-        ),
-        "a header like a book": (zipped(members('{"a": ' * 100_000)), damaged),
+        "a billion features, claimed": (whole | {"weights": billion + bytes(100)}, damaged),
+        "as many, packed": (whole | {"weights": billion + bytes(65_000_000)}, "is too large"),
+        "ninety million, asked for": (members(asking), r"weights .* not of shape \(1, 89\d{6}\)"),
+        "a header like a book": (members('{"a": ' * 100_000), damaged),
     }
 
 
@@ -150,8 +141,8 @@ BOMBS = bombs()
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_is_rejected(tmp_path: Path, name: str) -> None:
-    data, words = BOMBS[name]
+    parts, words = BOMBS[name]
     path = tmp_path / "model.npz"
-    path.write_bytes(data)
+    path.write_bytes(zipped(parts))
     with pytest.raises(ModelError, match=words):
         load_model(path)

@@ -10,7 +10,8 @@ from conftest import Run
 from detect.onnx.graphs import RedBox, ultralytics, write_network
 from running import write_images
 from vdet.config.schema import NetworkSettings
-from vdet.detect.onnx.detector import NetworkModel
+from vdet.detect.onnx.detector import NetworkModel, class_numbers
+from vdet.detect.onnx.network import COCO
 from vdet.labels.reading import read_tracks
 from vdet.media import Picture
 
@@ -78,3 +79,22 @@ def test_the_minimum_score_of_an_image_and_the_maximum_height_depend_on_the_clas
     detector = NetworkModel(NetworkSettings(), network).for_video(128, 64, [])
     boxes = detector.detect(detector.search(Picture(image), None))
     assert boxes.class_names == [name] * is_shown
+
+
+WANTED = ("car", "truck", "bus", "vehicle")
+
+
+def test_names_of_others_are_taken_for_ours() -> None:
+    names = ("Van", "lorry", "coach", "person", "vehicle", "trailer", "Two wheeler")
+    assert class_numbers(names, WANTED) == [0, 1, 2, -1, 3, -1, -1]
+    assert class_numbers(names, (*WANTED, "motorcycle"))[-1] == 4
+    others = ("HGV", "LGV", "minibus", "Jeep", "ambulance", "auto", "E-Rickshaw", "tricycle")
+    assert class_numbers(others, WANTED) == [1, 0, 2, 0, 0, 3, 3, 3]
+
+
+def test_any_class_that_the_network_knows_may_be_wanted() -> None:
+    numbers = class_numbers(COCO, ("traffic light", "car"))
+    assert {name: number for name, number in zip(COCO, numbers, strict=True) if number >= 0} == {
+        "traffic light": 0,
+        "car": 1,
+    }

@@ -12,7 +12,15 @@ import pytest
 from onnx import TensorProto, helper
 
 from conftest import Run
-from detect.onnx.graphs import Form, RedBox, final, ultralytics, write_graph, write_network
+from detect.onnx.graphs import (
+    Form,
+    RedBox,
+    final,
+    ultralytics,
+    write_graph,
+    write_network,
+    write_with_weights_elsewhere,
+)
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import NetworkModel
@@ -238,3 +246,24 @@ def test_the_score_of_a_box_is_calibrated_by_the_class_it_is_named() -> None:
     assert found[:, 5].tolist() == [0, 0, 0, 1, *[0] * 17]
     expected = [1 / (1 + math.exp(-(1 * 0.5 + 0))), 1 / (1 + math.exp(-(2 * 0.5 - 3)))]
     assert found[[0, 3], 4].tolist() == pytest.approx(expected, abs=1e-6)
+
+
+def test_weights_in_other_files_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    weights = tmp_path / "weights.bin"
+    weights.write_bytes(bytes(16))
+    for location in ("weights.bin", str(weights), f"../{tmp_path.name}/weights.bin"):
+        path = write_with_weights_elsewhere(tmp_path / "net.onnx", location)
+        with pytest.raises(
+            ModelError, match=r"net\.onnx: .* in other files; export it as one file"
+        ):
+            Session(path)
+    assert capfd.readouterr().err == ""
+
+
+def test_a_network_of_another_form_is_named_with_the_way_to_onnx(tmp_path: Path) -> None:
+    (tmp_path / "net.xml").write_text("<net/>", encoding="utf-8")
+    with pytest.raises(ModelError, match=r"net\.xml: is a file of OpenVINO; export the network as"):
+        Session(tmp_path / "net.xml")

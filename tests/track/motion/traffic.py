@@ -21,10 +21,8 @@ from vdet.synthetic import (
     PinholeCamera,
     Scene,
     SceneVehicle,
-    TrueBox,
     Waypoint,
     random_body,
-    true_boxes,
 )
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import Track
@@ -76,12 +74,11 @@ class Noise:
 PERFECT = Noise(0, 0, 0)
 
 
-def detect(truth: Iterable[TrueBox], noise: Noise, rng: np.random.Generator) -> Boxes:
+def detect(truth: Iterable[Track], noise: Noise, rng: np.random.Generator) -> Boxes:
     """Give what a detector with such noise sees; without noise all scores are 1."""
     boxes, scores = [], []
     for vehicle in truth:
-        missed = noise.missed + (0.5 * vehicle.hidden if noise.missed else 0)
-        if vehicle.hidden > 0.6 or rng.random() < missed or vehicle.box.width < 12:
+        if vehicle.ignored or rng.random() < noise.missed:
             continue
         x1, y1, x2, y2 = vehicle.box.pixels
         sizes = np.array([x2 - x1, y2 - y1] * 2)
@@ -107,6 +104,7 @@ def track_scores(
         CAMERA, Carriageway(-9, 9, lines=()), vehicles=tuple(vehicles), rate=Fraction(rate),
         frames=SECONDS * rate,
     )  # fmt: skip
+    truth = true_labels(scene, range(scene.frames))
     rng = np.random.default_rng(seed)
     tracker = MotionTracker(MotionTrackerSettings(), WIDTH, HEIGHT)
     shown: dict[int, list[Track]] = {}
@@ -115,6 +113,6 @@ def track_scores(
         if number % stride:
             shown[number] = tracker.at(time)
         else:
-            found = detect(true_boxes(scene, number), noise, rng)
+            found = detect(truth.frames.get(number, ()), noise, rng)
             shown[number] = tracker.update(found, time)
-    return score(SavedTracks(shown), true_labels(scene, range(scene.frames)))
+    return score(SavedTracks(shown), truth)
