@@ -67,14 +67,15 @@ def arrays_of(model: LinearModel) -> dict[str, npt.NDArray[Any]]:
 
 def write_parts(path: Path, **changes: Any) -> Path:
     """Write a model of two members with boxes, with some parts replaced; None leaves one out."""
-    parts = {"header": header_of(), **arrays_of(model_with_boxes())} | changes
+    parts: dict[str, Any] = {"header": header_of(), **arrays_of(model_with_boxes())} | changes
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, part in parts.items():
-            if part is not None:
-                text = json.dumps(part).encode() if isinstance(part, dict) else part
-                array = np.frombuffer(text, np.uint8) if isinstance(text, bytes) else text
-                with archive.open(f"{name}.npy", "w") as file:
-                    np.save(file, array, allow_pickle=True)
+            if part is None:
+                continue
+            text = json.dumps(part).encode() if isinstance(part, dict) else part
+            array = np.frombuffer(text, np.uint8) if isinstance(text, bytes) else text
+            with archive.open(f"{name}.npy", "w") as file:
+                np.save(file, array, allow_pickle=True)
     return path
 
 
