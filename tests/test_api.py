@@ -273,10 +273,7 @@ class Latest:
     """A tracker of the user's own: the latest detections."""
 
     def update(
-        self,
-        detections: vdet.Boxes,
-        time: float,  # noqa: ARG002
-        picture: Picture | None = None,  # noqa: ARG002
+        self, detections: vdet.Boxes, _: float, __: Picture | None = None
     ) -> list[vdet.Track]:
         return [
             vdet.Track(number, detection.box, 0.9, state="detected")
@@ -334,10 +331,8 @@ def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Pat
 def test_a_model_file_decides_the_kind_of_its_detector(tmp_path: Path) -> None:
     for name in ("svm.npz", "net.onnx"):
         shutil.copy(SHIPPED.with_name(name), tmp_path / name)
-        assert (
-            len(vdet.Detector(detector=tmp_path / name).detect(np.zeros((96, 160, 3), np.uint8)))
-            == 0
-        )
+        detector = vdet.Detector(detector=tmp_path / name)
+        assert len(detector.detect(np.zeros((96, 160, 3), np.uint8))) == 0
     with pytest.raises(vdet.VdetError, match=r"none\.npz: cannot be read"):
         vdet.Detector(detector="none.npz")
 

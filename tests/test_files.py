@@ -73,23 +73,6 @@ def test_a_link_is_replaced_and_not_what_it_leads_to(tmp_path: Path) -> None:
     assert (tmp_path / "out.txt").read_text() == "new"
 
 
-LEAVE_ONE = """
-import os, sys
-from pathlib import Path
-from vdet.files import staged
-
-with staged(Path(sys.argv[1])):
-    os._exit(1)
-"""
-
-
-def leave_one(path: Path) -> None:
-    """Let a process end in the middle of writing `path`."""
-    subprocess.run([sys.executable, "-c", LEAVE_ONE, str(path)], check=False)
-    (left,) = path.parent.glob(".vdet-*")
-    assert (left / path.name).exists()
-
-
 class TestOutputFiles:
     """The files of one run appear together, or none does."""
 
@@ -115,12 +98,8 @@ class TestOutputFiles:
     def test_what_appeared_before_a_rename_that_fails_is_removed(self, tmp_path: Path) -> None:
         (tmp_path / "2.txt").write_text("old")
         (tmp_path / "3.txt").mkdir()
-        with (
-            pytest.raises(
-                OutputError, match=r"3\.txt: is not a regular file and will not be replaced"
-            ),
-            OutputFiles(overwrite=True) as files,
-        ):
+        refusal = r"3\.txt: is not a regular file and will not be replaced"
+        with pytest.raises(OutputError, match=refusal), OutputFiles(overwrite=True) as files:
             self.write(tmp_path, files, 1, 2, 3, 4)
         assert names(tmp_path) == ["2.txt", "3.txt"]
         assert (tmp_path / "2.txt").read_text() == "old"
@@ -368,7 +347,14 @@ class TestFolder:
 def test_what_a_killed_run_left_is_removed_and_that_of_a_running_one_is_kept(
     tmp_path: Path,
 ) -> None:
-    leave_one(tmp_path / "a.csv")
+    path = tmp_path / "a.csv"
+    code = f"""if True:
+        import os, pathlib, vdet.files
+        with vdet.files.staged(pathlib.Path({str(path)!r})):
+            os._exit(1)
+    """
+    subprocess.run([sys.executable, "-c", code], check=False)
+    assert [left.name for left in tmp_path.glob(".vdet-*/*")] == ["a.csv"]
     (tmp_path / "precious").mkdir()
     (tmp_path / f".vdet-{_HOST}-{DIGITS}").symlink_to("precious")
     with OutputFiles() as files:

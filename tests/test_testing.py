@@ -103,12 +103,7 @@ class Shares:
     def __init__(self) -> None:
         self.own = [next(self.ids), next(self.ids)]
 
-    def update(
-        self,
-        detections: Boxes,
-        time: float,  # noqa: ARG002
-        picture: Picture | None = None,  # noqa: ARG002
-    ) -> list[Track]:
+    def update(self, detections: Boxes, _: float, __: Picture | None = None) -> list[Track]:
         pairs = zip(self.own, rounded(detections), strict=False)
         return [Track(number, box, 0.5, state="detected") for number, box in pairs]
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import av
 import pytest
 
+from clips import remuxed
 from faults.conftest import Start
 from labels.writers import Boxed, Labelled, write_yolo
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_model, red_settings
@@ -121,14 +121,7 @@ class Pipe:
 @pytest.fixture
 def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
     """A pipe that gives two thirds of the clip, as a transport stream."""
-    stream = tmp_path / "in" / "clip.ts"
-    with av.open(str(clip)) as source, av.open(str(stream), "w") as target:
-        video = target.add_stream_from_template(source.streams.video[0])
-        for packet in source.demux(video=0):
-            if packet.dts is not None:
-                packet.stream = video
-                target.mux(packet)
-    content = stream.read_bytes()
+    content = remuxed(tmp_path / "in" / "clip.ts", clip).read_bytes()
     pipe = Pipe(tmp_path / "in" / "pipe.ts", content[: len(content) * 2 // 3])
     yield pipe
     pipe.close()

@@ -108,24 +108,22 @@ class TestFile:
         ("source", "coding", "written"),
         [
             (ColorTags(), Coding(), ColorTags()),
+            (ColorTags(), Coding(full_range=True), ColorTags()),
             (ColorTags(1, 1, 5), Coding(), ColorTags(1, 1, 6)),
             (ColorTags(1, 1, 1), Coding("bt709"), ColorTags(1, 1, 1)),
+            (ColorTags(1, 1, 1), Coding("bt709", full_range=True), ColorTags(1, 1, 1)),
             (ColorTags(1, 1, 1), Coding(), ColorTags(1, 1, 6)),
             (ColorTags(9, 14, 9), Coding(), ColorTags(9, 14, 6)),
         ],
     )
-    @pytest.mark.parametrize("full_range", [False, True])
     def test_colours_are_tagged_as_they_are_coded_if_the_source_is_tagged(
         self,
         source: ColorTags,
         coding: Coding,
         written: ColorTags,
-        *,
-        full_range: bool,
         frames: list[Frame],
         tmp_path: Path,
     ) -> None:
-        coding = replace(coding, full_range=full_range)
         path = write(tmp_path / "out.mp4", frames, replace(INFO, color=source, coding=coding))
         with VideoReader(path) as reader:
             assert reader.info.color == written

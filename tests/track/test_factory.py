@@ -24,12 +24,7 @@ class SeesOne:
     def __init__(self) -> None:
         self.times: list[float] = []
 
-    def update(
-        self,
-        detections: Boxes,  # noqa: ARG002
-        time: float,
-        picture: Picture | None = None,  # noqa: ARG002
-    ) -> list[Track]:
+    def update(self, _: Boxes, time: float, __: Picture | None = None) -> list[Track]:
         self.times.append(time)
         return [Track(1, moved_to(CAR, 100 + round(100 * time), 100), 0.9, state="detected")]
 
