@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from vdet.media.reader import VideoReader
+from running import frames_of
 from vdet.synthetic import Scene, demo_scene
 
 FRAMES = 60
@@ -31,8 +31,7 @@ def test_draws_finds_counts_trains_and_compares(
     result = run("demo", folder, code=0)
     assert {path.name for path in folder.iterdir()} == NAMES
     assert len(list((folder / "training").iterdir())) == 2, "a road and its truth"
-    with VideoReader(folder / "found.mp4") as reader:
-        assert sum(1 for _ in reader) == FRAMES
+    assert frames_of(folder / "found.mp4") == FRAMES
     assert [step in result.err for step in ("1/4", "2/4", "3/4", "4/4")] == [True] * 4
     _, network, linear = result.out.splitlines()[:3]
     assert network.startswith("network")

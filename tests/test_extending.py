@@ -13,7 +13,7 @@ import pytest
 from doc_pages import blocks
 from labels.writers import Boxed, Labelled, show, write_coco
 from red_cars import CAR, HEIGHT, WIDTH, car_at, drive
-from running import frames_of, write_drive
+from running import frames_of, with_modules, write_drive
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.testing import check_detector, check_sink, check_tracker
@@ -55,10 +55,9 @@ def vdet(
     package: Path, *arguments: str | Path, code: int = 0
 ) -> "subprocess.CompletedProcess[str]":
     """Run vdet in a process of its own that finds the package."""
-    path = os.pathsep.join([str(package), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", "vdet", *map(str, arguments)]
     done = subprocess.run(
-        command, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": path}
+        command, capture_output=True, text=True, check=False, env=with_modules(package)
     )
     assert done.returncode == code, done.stderr
     return done
@@ -103,13 +102,11 @@ def test_detector_and_tracker_run_through_eval_video(
     package: Path, clip: Path, tmp_path: Path
 ) -> None:
     truth = tmp_path / "gt.txt"
-    cars = [car_at(number) for number in range(FRAMES)]
-    truth.write_text(
-        "".join(
-            f"{number},7,{car.x1 + 1},{car.y1 + 1},{car.width},{car.height},1,3,1\n"
-            for number, car in enumerate(cars, start=1)
-        )
+    rows = (
+        f"{number},7,{car.x1 + 1},{car.y1 + 1},{car.width},{car.height},1,3,1\n"
+        for number, car in enumerate(map(car_at, range(FRAMES)), start=1)
     )
+    truth.write_text("".join(rows))
     done = vdet(package, *("eval", "video", clip, "--truth", truth, *CHOSEN), *("--json", "-"))
     total = json.loads(done.stdout)["total"]
     assert (total["f1"], total["ap50"], total["id_switches"]) == (1, pytest.approx(1), 0)

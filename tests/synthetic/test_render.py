@@ -1,7 +1,7 @@
 """Drawn scenes, and the truth of their vehicles."""
 
 import math
-from dataclasses import astuple, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
-from benchmarks.drawn_traffic import true_places
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,7 +17,6 @@ from vdet.boxes import Box
 from vdet.media.reader import VideoReader
 from vdet.synthetic import (
     NEAR,
-    STANDS,
     Renderer,
     Scene,
     Shadow,
@@ -105,14 +103,6 @@ def test_a_vehicle_may_drive_in_any_direction(heading: float) -> None:
     assert found.box.width / found.box.height > 1 + length / 5
 
 
-def test_a_vehicle_right_behind_a_nearer_one_is_hidden_but_keeps_its_box() -> None:
-    alone = true_boxes(make_scene(parked(2, 30.0, 0.0)), 0)[0]
-    front, back = true_boxes(make_scene(parked(1, 10.0, 0.0), parked(2, 30.0, 0.0)), 0)
-    assert back.box == alone.box
-    assert back.hidden == 1
-    assert front.hidden == 0
-
-
 def test_hidden_is_the_fraction_of_the_farther_vehicle_that_the_nearer_one_covers() -> None:
     near, far = parked(1, 12.0, 0.0), parked(2, 30.0, 2.0)
     front, back = drawn(make_scene(near)), drawn(make_scene(far))
@@ -120,15 +110,6 @@ def test_hidden_is_the_fraction_of_the_farther_vehicle_that_the_nearer_one_cover
     assert 0.2 < covered < 0.8
     found = true_boxes(make_scene(near, far), 0)[1]
     assert found.hidden == pytest.approx(covered, abs=0.05)
-
-
-def test_places_are_those_of_the_rear_tyres_and_lanes_are_counted_by_lines() -> None:
-    vehicles = [(5, 10.0, 0.3), (1, 30.0, -3.7), (2, 25.0, 2.0), (7, -8.0, 3.7)]
-    scene = make_scene(*(parked(*vehicle) for vehicle in vehicles))
-    assert {n: astuple(place) for n, place in true_places(scene, 0).items()} == {
-        number: pytest.approx((ahead + STANDS, lateral, lane))
-        for (number, ahead, lateral), lane in zip(vehicles, (0, -1, 1, 1), strict=True)
-    }
 
 
 @pytest.mark.parametrize(

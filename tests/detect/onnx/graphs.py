@@ -10,13 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import onnx
 from onnx import TensorProto, helper, numpy_helper, parser
 
 Array = npt.NDArray[np.float32]
-
-OPSET = helper.make_opsetid("", 17)
-IR_VERSION = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +69,7 @@ def final(box: RedBox, rows: int = 300) -> Form:
     return Form(table, 2, 4)
 
 
-NETWORK = """
-<ir_version: 8, opset_import: ["" : 17]>
+RED_PIXEL = """
 detector (float[{batch}, 3, {height}, {width}] images) => (float[] output0)
 <int64[3] first = {{0, {y}, {x}}}, int64[3] end = {{1, {below}, {beside}}},
  int64[3] axes = {{1, 2, 3}}, int64[3] cube = {{1, 1, 1}}>
@@ -98,15 +93,14 @@ def write_network(
 ) -> Path:
     """Write a network with one input of `size` whose score is the red of `pixel` of the input."""
     (width, height), (x, y) = size, pixel
-    text = NETWORK.format(
+    text = RED_PIXEL.format(
         batch=batch, height=height, width=width, x=x, y=y, below=y + 1, beside=x + 1
     )
-    model = parser.parse_model(text)
     hot = np.zeros((1, *form.table.shape), np.float32)
     hot[0, form.score_row, form.score_column] = 1
-    for name, values in (("hot", hot), ("table", form.table[np.newaxis])):
-        model.graph.initializer.append(numpy_helper.from_array(values, name))
-    return _save(path, model, metadata)
+    constants = {"hot": hot, "table": form.table[np.newaxis]}
+    tensors = [numpy_helper.from_array(values, name) for name, values in constants.items()]
+    return write_graph(path, text, tensors, metadata)
 
 
 def write_with_weights_elsewhere(path: Path, location: str) -> Path:
@@ -114,28 +108,19 @@ def write_with_weights_elsewhere(path: Path, location: str) -> Path:
     weights = TensorProto(name="weights", dims=[4], data_type=TensorProto.FLOAT)
     weights.data_location = TensorProto.EXTERNAL
     weights.external_data.add(key="location", value=location)
-    value = helper.make_tensor_value_info
-    nodes = [helper.make_node("Add", ["images", "weights"], ["output0"])]
-    inputs = [value("images", TensorProto.FLOAT, [1, 3, 64, 4])]
-    outputs = [value("output0", TensorProto.FLOAT, None)]
-    return write_graph(path, nodes, inputs, outputs, [weights])
+    signature = "detector (float[1, 3, 64, 4] images) => (float[] output0)"
+    return write_graph(path, f"{signature} {{ output0 = Add (images, weights) }}", [weights])
 
 
 def write_graph(
     path: Path,
-    nodes: Sequence[onnx.NodeProto],
-    inputs: Sequence[onnx.ValueInfoProto],
-    outputs: Sequence[onnx.ValueInfoProto],
-    constants: Sequence[onnx.TensorProto],
+    text: str,
+    constants: Sequence[TensorProto] = (),
     metadata: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write a network of any graph."""
-    graph = helper.make_graph(nodes, "detector", inputs, outputs, constants)
-    model = helper.make_model(graph, opset_imports=[OPSET], ir_version=IR_VERSION)
-    return _save(path, model, metadata)
-
-
-def _save(path: Path, model: onnx.ModelProto, metadata: Mapping[str, str] | None) -> Path:
+    """Write a network of a graph in the text form of ONNX, with further constants."""
+    model = parser.parse_model(f'<ir_version: 8, opset_import: ["" : 17]>\n{text}')
+    model.graph.initializer.extend(constants)
     if metadata:
         helper.set_model_props(model, dict(metadata))
     path.write_bytes(model.SerializeToString())
