@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -108,10 +107,7 @@ def bad_models() -> Iterator[bytes]:
         yield zipped(whole | {name: npy(array)})
 
 
-def test_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
-    picture = tmp_path / "picture.png"
-    noise = np.random.default_rng(0).integers(0, 256, (90, 160, 3), dtype=np.uint8)
-    cv2.imwrite(str(picture), noise)
+def test_damaged_models_are_used_or_refused(tmp_path: Path, picture: Path) -> None:
     contents = {f"{number}.npz": data for number, data in enumerate(bad_models())}
     assert len(contents) == 200
     use = ("detect-image", picture, "--model")

@@ -2,10 +2,8 @@
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
-import pytest
 from onnx import numpy_helper
 
 from detect.onnx.graphs import write_graph
@@ -38,26 +36,19 @@ NETWORKS: dict[str, tuple[npt.ArrayLike, dict[str, str], str]] = {
 }
 
 
-@pytest.fixture(scope="module")
-def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("picture") / "noise.png"
-    cv2.imwrite(str(path), np.random.default_rng(0).integers(0, 256, (90, 160, 3), np.uint8))
-    return path
-
-
-def test_wicked_networks_are_refused(tmp_path: Path, noise: Path) -> None:
+def test_wicked_networks_are_refused(tmp_path: Path, picture: Path) -> None:
     paths = []
     for number, (values, metadata, _) in enumerate(NETWORKS.values()):
         table = numpy_helper.from_array(np.array(values, np.float32), "table")
         paths.append(write_graph(tmp_path / f"{number}.onnx", CONSTANT, [table], metadata))
-    trials = try_all([("detect-image", noise, "--model", path, "--json", "-") for path in paths])
+    trials = try_all([("detect-image", picture, "--model", path, "--json", "-") for path in paths])
     assert broken_promises(trials) == []
     for trial, (name, (_, _, words)) in zip(trials, NETWORKS.items(), strict=True):
         assert (trial.code, words in trial.err) == (1, True), (name, trial.err)
 
 
-def test_damaged_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> None:
+def test_damaged_networks_are_used_or_refused(tmp_path: Path, picture: Path) -> None:
     damaged = enumerate(mutated(SHIPPED.read_bytes(), seed=1, count=60))
     contents = {f"{number}.onnx": data for number, data in damaged}
-    use = ("detect-image", noise, "--json", "-", "--model")
+    use = ("detect-image", picture, "--json", "-", "--model")
     assert len(try_files(tmp_path, contents, lambda path, _: [*use, path])) == 60

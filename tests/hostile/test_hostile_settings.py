@@ -4,8 +4,6 @@ import codecs
 from itertools import pairwise
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 
 from hostile.mutations import mutated, with_other_words
@@ -75,14 +73,6 @@ NUMBERS = (
     *("4294967296", "-9223372036854775808", "1e-300", "1e300", "1e999", ".inf", "-.inf", ".nan"),
     *("true", "null", "[]", "{}", "[1, 2, 3]", "2001-01-01", "1:60:60", "none", "patch", "dense"),
 )
-
-
-@pytest.fixture(scope="module")
-def picture(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("picture") / "picture.png"
-    noise = np.random.default_rng(0).integers(0, 256, (9, 16, 3), dtype=np.uint8)
-    cv2.imwrite(str(path), cv2.resize(noise, (160, 90)))
-    return path
 
 
 def test_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Path) -> None:
