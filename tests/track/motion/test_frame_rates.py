@@ -19,8 +19,6 @@ DEFAULTS = MotionTrackerSettings()
 
 every_rate = pytest.mark.parametrize("rate", RATES)
 
-# Times
-
 
 @every_rate
 def test_a_clearly_seen_vehicle_is_shown_from_its_second_to_its_eighth_frame_on(rate: int) -> None:
@@ -45,9 +43,6 @@ def test_a_lost_vehicle_keeps_its_id_for_the_same_time(rate: int) -> None:
         assert ids(shown[-1:]) == {id_}
 
 
-# Progress
-
-
 def test_frames_may_come_at_any_times() -> None:
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.01, 0.2, 100))
@@ -69,8 +64,6 @@ def test_a_vehicle_keeps_its_id_through_a_short_gap_in_the_video(gap: float, id_
         tracks = tracker.update(detections([CAR]), 0.8 + gap + n / 25)
     assert [track.id for track in tracks] == [id_]
 
-
-# Traffic
 
 OVERTAKING = (
     driving(1, lane=0, ahead=25, speed=0.2),

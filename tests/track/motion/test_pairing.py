@@ -26,8 +26,6 @@ def test_a_later_round_has_what_the_earlier_ones_left() -> None:
     assert pair(np.array([[0.9, 0.4], [0.3, 0.0]]), [[1], [0]]) == {1: 0, 0: 1}
 
 
-# Pairs with the largest sum
-
 SHAPES = array_shapes(min_dims=2, max_dims=2, min_side=0, max_side=9)
 TENTHS = st.integers(0, 10).map(lambda tenths: tenths / 10)
 """So that many values are equal, and many are 0."""

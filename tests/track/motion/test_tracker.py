@@ -27,8 +27,6 @@ CAR = Box.sized(400, 400, 100, 70)
 DEFAULTS = MotionTrackerSettings()
 CARRIED = frames(DEFAULTS.coast_seconds)
 
-# Showing
-
 
 def test_evidence_weaker_than_the_leak_never_adds_up() -> None:
     assert ids(follow([[(CAR, DEFAULTS.decay)]] * 300)) == set()
@@ -57,9 +55,6 @@ def test_a_vehicle_is_shown_once_it_is_large_enough(width: int, height: int) -> 
     assert places[first_shown(shown)].area ** 0.5 == pytest.approx(minimum, abs=2)
 
 
-# Place
-
-
 @pytest.mark.parametrize(("dx", "dy"), [(0, 0), (4, 0), (-4, 1), (15, 3)])
 def test_a_steadily_moving_vehicle_is_shown_where_it_is(dx: float, dy: float) -> None:
     places = moving(CAR, dx, dy, frames=40)
@@ -67,9 +62,6 @@ def test_a_steadily_moving_vehicle_is_shown_where_it_is(dx: float, dy: float) ->
     assert ids(shown) == {1}
     for place, tracks in list(zip(places, shown, strict=True))[20:]:
         assert tracks[0].box.iou(place) > 0.97
-
-
-# Missed frames
 
 
 def test_through_missed_frames_a_vehicle_is_shown_where_its_motion_leads() -> None:
@@ -99,8 +91,6 @@ def test_weak_detections_do_not_lead_from_one_vehicle_to_the_next() -> None:
     assert ids(shown[:20]) == {1}
     assert [id_at(tracks, back[-1]) for tracks in shown[-1:]] == [2]
 
-
-# One vehicle behind another
 
 VAN = Box.sized(100, 390, 180, 130)
 
@@ -148,9 +138,6 @@ def test_a_vehicle_that_comes_out_from_behind_is_shown_once_it_is_clearly_detect
     assert len(follow([*[[hiding]] * 20, *[[hiding, half]] * 6])[-1]) == 1
 
 
-# One vehicle, one track
-
-
 def test_a_hidden_vehicle_does_not_take_the_detection_of_the_nearer_one() -> None:
     """Not even where the nearer one could have that of its part instead."""
     near, part = Box.sized(400, 300, 100, 70), Box.sized(400, 300, 63, 70)
@@ -171,9 +158,6 @@ def test_a_small_vehicle_before_a_large_one_is_not_a_part_of_it() -> None:
     shown = follow([truck, car] for car in cars)
     assert ids(shown) == {1, 2}
     assert [len(tracks) for tracks in shown[5:]] == [2] * 55
-
-
-# Ids
 
 
 def test_a_shadow_that_is_taken_for_a_vehicle_keeps_none_that_brakes_over_it() -> None:

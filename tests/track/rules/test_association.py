@@ -39,8 +39,6 @@ def boxes_of(tracker: RulesTracker) -> dict[Car, Box]:
 
 
 # Rule 2
-
-
 def test_a_region_belongs_to_the_car_whose_centroid_it_contains() -> None:
     cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
     over_right, over_left = Box.sized(310, 190, 100, 80), Box.sized(90, 190, 100, 80)
@@ -50,7 +48,6 @@ def test_a_region_belongs_to_the_car_whose_centroid_it_contains() -> None:
 
 
 # Rule 3
-
 AROUND_BOTH = Box.sized(90, 190, 340, 100)
 
 
@@ -75,7 +72,6 @@ def test_a_region_of_several_cars_with_none_confirmed_is_the_nearest_ones() -> N
 
 
 # Rules 4 and 5
-
 CLOSE = Box.sized(150, 200, 100, 80)
 
 
@@ -120,7 +116,6 @@ def test_confirmed_cars_apart_stay_apart_and_move_to_their_matches() -> None:
 
 
 # Rules 6 to 8 and 11: one car and one region
-
 WIDE = Box.sized(100, 200, 320, 80)
 
 
@@ -170,7 +165,6 @@ def test_of_two_near_cars_the_one_without_a_region_goes_first() -> None:
 
 
 # Rules 9 and 10
-
 LORRY = Box.sized(100, 200, 200, 100)
 ITS_FRONT, ITS_REAR = Box.sized(80, 200, 70, 100), Box.sized(250, 200, 60, 100)
 COMBINED = Box.sized(80, 200, 230, 100)
@@ -217,8 +211,6 @@ def test_regions_of_a_cars_size_but_too_wide_make_two_cars_shown_at_once(
 
 
 # Rule 11
-
-
 def test_a_region_beside_a_car_that_has_its_own_is_a_new_car() -> None:
     car = a_car(LEFT, road())
     beside = Box.sized(220, 200, 90, 80)

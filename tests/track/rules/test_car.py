@@ -23,8 +23,6 @@ def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
     assert car.matches == 0
 
 
-# The search for its image
-
 GREY = np.full((200, 300, 3), 90, np.uint8)
 PLACE = Box.sized(100, 80, 60, 40)
 

@@ -41,8 +41,6 @@ def ids(tracks: list[Track]) -> list[int]:
 
 
 # Rule 1
-
-
 def test_regions_that_are_too_small_are_ignored() -> None:
     settings = tracker_but(detections_needed=1)
     assert see(
@@ -58,7 +56,6 @@ def test_a_region_has_the_strength_of_its_detection_as_its_peak() -> None:
 
 
 # Rule 12
-
 BUS = Box.sized(230, 200, 120, 100)
 BOTH = Box.sized(90, 190, 270, 120)
 
@@ -73,8 +70,6 @@ def test_a_shown_car_left_inside_another_is_absorbed_which_is_shown_at_once() ->
 
 
 # Rule 13
-
-
 def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
     cars = RulesTracker(tracker_but(history=1))
     show(cars, SEDAN)
@@ -92,8 +87,6 @@ def test_a_car_that_was_never_shown_is_not_searched() -> None:
 
 
 # Rule 14
-
-
 @pytest.mark.parametrize(("peak", "first_shown"), [(2.0, 10), (5.0, 3)])
 def test_a_car_is_shown_after_ten_detections_in_a_row_or_three_confident_ones(
     peak: float, first_shown: int
@@ -113,8 +106,6 @@ def test_a_missed_car_is_not_shown_and_counted_from_the_start_again() -> None:
 
 
 # Rules 15 to 17. A car that comes back under its old id was not deleted.
-
-
 @pytest.mark.parametrize(
     ("detections", "young", "id_after"), [(6, 7, 2), (7, 7, 1), (7, 8, 2), (1, 0, 1)]
 )
@@ -149,18 +140,12 @@ def test_a_car_missed_five_frames_in_a_row_is_deleted(
     assert ids(see(cars, SEDAN)[0]) == [id_after]
 
 
-# Ids and boxes
-
-
 def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
     cars = RulesTracker(SEED_TRACKER)
     see(cars, SEDAN, frames=5)
     see(cars, SEDAN, VAN, frames=5)
     shown = see(cars, VAN, SEDAN, frames=5)
     assert [(track.id, track.box) for track in shown[-1]] == [(1, SEDAN), (2, VAN)]
-
-
-# Scores, classes, and the frame
 
 
 def test_the_score_of_a_track_is_the_average_of_its_last_ten_detections() -> None:
