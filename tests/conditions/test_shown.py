@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-import vdet
 from conftest import Run
 from red_cars import red_settings
 from running import write_drive
@@ -60,9 +59,3 @@ def test_a_batch_says_a_note_once_and_has_it_in_the_manifest(
     assert [json.loads(line)["facts"]["conditions"] for line in lines] == [FINDINGS] * 2
     index = (tmp_path / "found" / "index.html").read_text()
     assert (index.count(TEXT), index.count(NO_LANE), index.count("⚠")) == (0, 4, 2)
-
-
-def test_python_gets_it_too(clip: Path, config: Path, tmp_path: Path) -> None:
-    settings = vdet.load_settings(config, ["lanes.enabled=true"])
-    totals = vdet.detect_video(clip, tracks=tmp_path / "a.csv", settings=settings)
-    assert totals.facts["conditions"].record() == FINDINGS

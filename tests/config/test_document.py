@@ -152,11 +152,3 @@ def test_an_assignment_needs_a_whole_key_and_a_value_in_yaml(text: str, message:
     with pytest.raises(ConfigError) as error:
         parse_assignment(text)
     assert str(error.value).startswith(message)
-
-
-def test_times_dates_and_words_are_text_that_settings_convert() -> None:
-    text = "a: 2026-05-01T07:00:00\nb: 2026-05-01\nc: 15:00\nd: no\ne: [on, true, 12]\n"
-    assert parse_document(text, "a.yaml").values == {
-        "a": "2026-05-01T07:00:00", "b": "2026-05-01", "c": "15:00", "d": "no",
-        "e": ["on", True, 12],
-    }  # fmt: skip

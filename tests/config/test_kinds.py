@@ -1,6 +1,5 @@
 """Sections of which there are several kinds: which one is chosen, and which keys it has."""
 
-import pickle
 import sys
 from pathlib import Path
 
@@ -57,12 +56,6 @@ def test_a_later_layer_changes_a_kind_or_chooses_another(
     settings = load(path, f"output: {{crf: 30}}\ntracker: {text}", *assignments)
     assert settings.tracker == tracker
     assert settings.output.crf == 30
-
-
-def test_settings_can_be_sent_to_another_process() -> None:
-    settings = load_settings((), ["tracker.kind=rules", "tracker.history=5"])
-    assert pickle.loads(pickle.dumps(settings)) == settings
-    assert hash(settings.tracker) == hash(RulesTrackerSettings(history=5))
 
 
 NOT_OF_MOTION = "unknown setting of tracker.kind: motion; known settings: kind, look_ahead, "

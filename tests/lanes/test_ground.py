@@ -26,12 +26,6 @@ def fitted(metres: Float64Array = CORNERS, pixels: Float64Array | None = None) -
     return fit_ground(seen(metres) if pixels is None else pixels, metres, PLAIN)
 
 
-def test_places_on_the_road_have_their_metres() -> None:
-    places = np.array([(0.0, 20.0), (-4.0, 45.0), (3.0, 15.0)])
-    ground = fitted()
-    assert ground.metres(seen(places) + EDGE) == pytest.approx(places, abs=1e-3)
-
-
 def test_metres_may_have_any_origin() -> None:
     utm = np.array([391_000.0, 5_820_000.0])
     steps = fitted(CORNERS + utm, seen(CORNERS)).metres(seen(CORNERS) + EDGE)

@@ -81,28 +81,21 @@ def overlapping_cars(*shown_as: int | None) -> tuple[list[Car], Image]:
     return [a_car(LEFT, frame, shown_as[0]), a_car(CLOSE, frame, shown_as[1])], frame
 
 
-def test_confirmed_cars_that_overlap_become_one_new_car_shown_at_once() -> None:
-    cars, frame = overlapping_cars(None, None)
+@pytest.mark.parametrize(
+    ("shown_as", "kept"), [((7, 4), 4), ((None, 4), 4), ((7, None), 7), ((None, None), None)]
+)
+def test_confirmed_cars_that_overlap_become_one_shown_at_once_under_the_lowest_id(
+    shown_as: tuple[int | None, int | None], kept: int | None
+) -> None:
+    cars, frame = overlapping_cars(*shown_as)
     around = Box.sized(95, 195, 160, 90)
     result = associate(cars, [around], frame)
     (car,) = result.cars
     assert car not in cars
-    assert boxes_of(result) == {car: around}
-    place = result.assigned[car]
-    car.see(place, frame)
-    assert car.is_shown
-    assert car.box == around
-
-
-@pytest.mark.parametrize(
-    ("shown_as", "kept"), [((7, 4), 4), ((None, 4), 4), ((7, None), 7), ((None, None), None)]
-)
-def test_a_merged_car_keeps_the_lowest_id_that_was_shown(
-    shown_as: tuple[int | None, int | None], kept: int | None
-) -> None:
-    cars, frame = overlapping_cars(*shown_as)
-    (car,) = associate(cars, [Box.sized(95, 195, 160, 90)], frame).cars
     assert car.id == kept
+    assert boxes_of(result) == {car: around}
+    car.see(result.assigned[car], frame)
+    assert (car.is_shown, car.box) == (True, around)
 
 
 def test_confirmed_cars_apart_stay_apart_and_move_to_their_matches() -> None:
