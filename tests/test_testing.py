@@ -1,9 +1,12 @@
 """The checks of `vdet.testing`: ours pass them, and what is wrong is found."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,7 +14,7 @@ import pytest
 from boxing import rounded
 from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
 from vdet.api import Tracker
-from vdet.boxes import Boxes, Image
+from vdet.boxes import Boxes
 from vdet.config.kinds import RulesTrackerSettings
 from vdet.config.loading import load_settings
 from vdet.config.schema import MotionTrackerSettings, Settings
@@ -50,47 +53,34 @@ def test_every_sink_passes(output: str, tmp_path: Path) -> None:
     check_sink(sink_kind(name), tmp_path / file, settings, still=name == "image")
 
 
-class Wrong:
-    """A detector that finds one box; each subclass breaks one rule."""
+@dataclass(frozen=True)
+class Finder:
+    """A detector that finds one box, unless it searches or detects in another way."""
 
-    def for_video(self, width: int, height: int, images: Sequence[Image]) -> "Wrong":  # noqa: ARG002
+    search: Callable[[Picture, int | None], Any] = lambda *_: None
+    detect: Callable[[Any], Boxes] = lambda _: Boxes([[1, 1, 9, 9]], [0.5])
+
+    def for_video(self, *_: object) -> "Finder":
         return self
 
-    def search(self, picture: Picture, index: int | None) -> Any:  # noqa: ARG002
-        return None
 
-    def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
-        return Boxes([[1, 1, 9, 9]], [0.5])
+def paint(picture: Picture, _: int | None) -> None:
+    picture.image[:] = 0
 
 
-class Paints(Wrong):
-    def search(self, picture: Picture, index: int | None) -> None:  # noqa: ARG002
-        picture.image[:] = 0
-
-
-class Outside(Wrong):
-    def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
-        return Boxes([[-5, 1, 9, 9]], [0.5])
-
-
-class Counts(Wrong):
-    def __init__(self) -> None:
-        self.calls = count(1)
-
-    def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
-        return Boxes([[1, 1, 9 + next(self.calls), 9]], [0.5])
+NUMBERS = count(9)
 
 
 @pytest.mark.parametrize(
     ("detector", "message"),
     [
-        (Paints(), "changed a frame"),
-        (Outside(), "lies outside the frame"),
-        (Counts(), "boxes differ"),
+        (Finder(search=paint), "changed a frame"),
+        (Finder(detect=lambda _: Boxes([[-5, 1, 9, 9]], [0.5])), "lies outside the frame"),
+        (Finder(detect=lambda _: Boxes([[1, 1, next(NUMBERS), 9]], [0.5])), "boxes differ"),
     ],
 )
-def test_a_detector_that_breaks_a_rule_is_found(detector: Wrong, message: str) -> None:
-    check_detector(Wrong(), IMAGES)
+def test_a_detector_that_breaks_a_rule_is_found(detector: Finder, message: str) -> None:
+    check_detector(Finder(), IMAGES)
     with pytest.raises(AssertionError, match=message):
         check_detector(detector, [image.copy() for image in IMAGES])
 
@@ -125,40 +115,23 @@ def test_a_tracker_that_breaks_a_rule_is_found(tracker: type[Shares], message: s
         check_tracker(lambda *_: tracker())
 
 
-class Early:
-    """A sink that writes where everybody sees it at once."""
+def sink_that(writes: Callable[[Path, Any], object]) -> SinkKind:
+    """Return a sink that does this with its final path and each result."""
 
-    def __init__(self, path: Path, context: SinkContext) -> None:  # noqa: ARG002
-        self.path = path
+    def opened(path: Path, _: SinkContext) -> Any:
+        return nullcontext(SimpleNamespace(write=partial(writes, path)))
 
-    def __enter__(self) -> "Early":
-        return self
-
-    def __exit__(self, *raised: object) -> None: ...
-
-    def write(self, result: Any) -> None:  # noqa: ARG002
-        self.path.touch()
-
-
-class Draws(Early):
-    def write(self, result: Any) -> None:
-        result.frame.image[:] = 0
-
-
-class Nothing(Early):
-    def write(self, result: Any) -> None: ...
+    return SinkKind(opened)
 
 
 @pytest.mark.parametrize(
     ("sink", "message"),
     [
-        (Early, "before the run has ended"),
-        (Draws, "changed the frame"),
-        (Nothing, "left no output"),
+        (sink_that(lambda path, _: path.touch()), "before the run has ended"),
+        (sink_that(lambda _, result: result.frame.image.fill(0)), "changed the frame"),
+        (sink_that(lambda *_: None), "left no output"),
     ],
 )
-def test_a_sink_that_breaks_a_rule_is_found(
-    sink: type[Early], message: str, tmp_path: Path
-) -> None:
+def test_a_sink_that_breaks_a_rule_is_found(sink: SinkKind, message: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match=message):
-        check_sink(SinkKind(sink), tmp_path / "out.txt")
+        check_sink(sink, tmp_path / "out.txt")

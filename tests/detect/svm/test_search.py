@@ -68,17 +68,6 @@ def fixed(*sets: WindowSettings) -> SearchSettings:
     return SearchSettings(windows=sets, perspective=PerspectiveSettings(sizes=()))
 
 
-PERSPECTIVE = SvmSettings(
-    features=SMALL,
-    search=SearchSettings(perspective=PerspectiveSettings(sizes=(0.1, 0.15, 0.2, 0.3))),
-)
-
-
-def by_perspective() -> SvmDetector:
-    """Return a search with four sets that follow the perspective."""
-    return SvmDetector(model_of(SMALL), PERSPECTIVE, 160, 120, horizon=0.3)
-
-
 def with_sides(sides: Sides) -> SvmDetector:
     """Return a search whose regression gives equal sides for all hits, half of the windows."""
     boxes = BoxRegression(np.zeros((4, SMALL.hog_length), np.float32), np.array(sides, np.float32))
@@ -115,7 +104,7 @@ class TestSearching:
 
 class TestVehicles:
     def test_without_a_regression_vehicles_are_the_windows(self) -> None:
-        found = search_all(by_perspective())
+        found = search_all(search_of(SMALL))
         np.testing.assert_array_equal(found.vehicles, found.boxes)
         assert found.vehicles.dtype == np.float32
 
