@@ -90,33 +90,19 @@ def write_yolo(folder: Path, pictures: Pictures) -> Path:
     return folder / "labels" / f"{min(pictures)}.txt"
 
 
+_IMAGE = {"license": 0, "flickr_url": "", "coco_url": "", "date_captured": 0}
+_BOX = {"category_id": 1, "segmentation": [], "area": 64.0, "bbox": [1.0, 1, 8, 8], "iscrowd": 0}
+_ATTRIBUTES = {"occluded": False, "rotation": 0.0, "keyframe": True}
+
+
 def exported(frames: Mapping[int, Sequence[int]], **known: object) -> bytes:
     """Return what CVAT exports as COCO 1.0 of a video: the ids of the cars of each frame."""
     images = [
-        {
-            "id": n,
-            "width": 300,
-            "height": 200,
-            "file_name": f"frame_{frame:06}.PNG",
-            "license": 0,
-            "flickr_url": "",
-            "coco_url": "",
-            "date_captured": 0,
-        }
+        _IMAGE | {"id": n, "width": 300, "height": 200, "file_name": f"frame_{frame:06}.PNG"}
         for n, frame in enumerate(frames, start=1)
     ]
     boxes = [
-        {
-            "id": n,
-            "image_id": n,
-            "category_id": 1,
-            "segmentation": [],
-            "area": 64.0,
-            "bbox": [1.0, 1.0, 8.0, 8.0],
-            "iscrowd": 0,
-            "attributes": {"occluded": False, "rotation": 0.0, "track_id": id_, "keyframe": True},
-        }
-        | known
+        _BOX | {"id": n, "image_id": n, "attributes": _ATTRIBUTES | {"track_id": id_}} | known
         for n, ids in enumerate(frames.values(), start=1)
         for id_ in ids
     ]
