@@ -90,17 +90,11 @@ def test_scalars_are_those_of_yaml_with_exponents_and_all_keys_are_text(
         ("a: 2001-99-99", "1:4: is not YAML: month must be in 1..12"),
         ("a: [1, 2", "1:9: is not YAML: "),
         *(
-            (
-                f"a: [0, {number}]",
-                f"1:8: is not YAML: {number} is octal in YAML, as it begins with 0",
-            )
-            for number in ("0550", "-010", "08", "00")
+            (f"a: [0, {n}]", f"1:8: is not YAML: {n} is octal")
+            for n in ("0550", "-010", "08", "00")
         ),
         *(
-            (
-                f"a: {text}",
-                f"1:4: is not YAML: found character '{text[0]}' that cannot start any token; q",
-            )
+            (f"a: {text}", f"1:4: is not YAML: found character '{text[0]}' that cannot start")
             for text in ("%Y%m%d", "@gate", "`x`")
         ),
         ("a: 1\n b: 2", "2:3: is not YAML: mapping values are not allowed here"),

@@ -29,19 +29,11 @@ from vdet.labels.reading import read_labelled_images
 
 FORMS = list(WRITERS)
 WIDTH, HEIGHT = 64, 32
-SCENE: Pictures = {
-    "a": Labelled(
-        WIDTH,
-        HEIGHT,
-        (
-            Boxed("car", (1, 2, 20, 10)),
-            Boxed("truck", (30.5, 4, 10, 20)),
-            Boxed("ignore", (0, 0, 5, 5)),
-            Boxed("cow", (50, 10, 4, 12)),
-        ),
-    ),
-    "b": Labelled(WIDTH, HEIGHT),
-}
+BOXES = (
+    *(Boxed("car", (1, 2, 20, 10)), Boxed("truck", (30.5, 4, 10, 20))),
+    *(Boxed("ignore", (0, 0, 5, 5)), Boxed("cow", (50, 10, 4, 12))),
+)
+SCENE: Pictures = {"a": Labelled(WIDTH, HEIGHT, BOXES), "b": Labelled(WIDTH, HEIGHT)}
 
 lengths = st.tuples(st.integers(0, 2 * WIDTH - 1), st.integers(1, 2 * WIDTH)).map(
     lambda pair: (pair[0] / 2, min(pair[1], 2 * WIDTH - pair[0]) / 2)

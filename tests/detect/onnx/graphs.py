@@ -27,12 +27,8 @@ class RedBox:
 
     @property
     def corners(self) -> tuple[float, float, float, float]:
-        return (
-            self.x - self.width / 2,
-            self.y - self.height / 2,
-            self.x + self.width / 2,
-            self.y + self.height / 2,
-        )
+        across, down = self.width / 2, self.height / 2
+        return self.x - across, self.y - down, self.x + across, self.y + down
 
 
 def cells(width: int, height: int) -> list[tuple[int, int, int]]:

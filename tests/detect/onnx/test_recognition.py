@@ -33,12 +33,7 @@ FRAME = 256, 256
 """Frames are square, inputs are not: letterboxes leave grey at the sides."""
 
 BOX = RedBox(x=64, y=32, width=16, height=8, class_id=2)
-ULTRALYTICS = {
-    "task": "detect",
-    "names": str(dict(enumerate(COCO))),
-    "imgsz": "[64, 128]",
-    "stride": "32",
-}
+ULTRALYTICS = {"task": "detect", "names": str(dict(enumerate(COCO))), "imgsz": "[64, 128]"}
 
 
 def frame_with_red(x: int, y: int) -> Image:

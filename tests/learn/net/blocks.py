@@ -23,12 +23,8 @@ def block_picture(seed: int, width: int = 256, height: int = 128) -> NetSample:
         cv2.rectangle(image, (x, y), (x + side - 1, y + side - 1), _COLORS[kind], -1)
         boxes.append((x, y, x + side, y + side))
         classes.append(kind)
-    return NetSample(
-        image,
-        np.array(boxes, np.float32),
-        np.array(classes, np.int64),
-        np.zeros(len(boxes), np.bool_),
-    )
+    ignored = np.zeros(count, np.bool_)
+    return NetSample(image, np.array(boxes, np.float32), np.array(classes, np.int64), ignored)
 
 
 def block_source(count: int = 60) -> NetSource:
