@@ -53,9 +53,8 @@ class TestMasks:
 
     def test_a_vehicle_is_in_any_of_the_included_regions(self, mask: dict[str, Any]) -> None:
         regions = laid(ROAD, mask)
-        assert [regions.contains(p) for p in ((210, 80), (190, 120), (60, 80))] == [
-            True, True, False,
-        ]  # fmt: skip
+        contained = [regions.contains(point) for point in ((210, 80), (190, 120), (60, 80))]
+        assert contained == [True, True, False]
 
     def test_one_of_another_shape_is_refused(self, mask: dict[str, Any]) -> None:
         with pytest.raises(ConfigError, match="its aspect ratio differs from frames"):

@@ -49,10 +49,8 @@ def is_size_of_points(section: type[Section], key: str) -> bool:
 
 
 def test_the_shipped_configs_are_printed_settings() -> None:
-    names = sorted(path.name for path in CONFIGS.iterdir())
-    assert names == [
-        *("ahead.yaml", "default.yaml", "project-camera.yaml", "seed.yaml", "svm.yaml")
-    ]
+    names = sorted(path.stem for path in CONFIGS.glob("*.yaml"))
+    assert names == ["ahead", "default", "project-camera", "seed", "svm"]
     assert (CONFIGS / "default.yaml").read_text(encoding="utf-8") == render_settings(Settings())
     tracker = SVM.tracker.model_copy(update={"look_ahead": 0.8})
     assert load_settings([CONFIGS / "svm.yaml"]) == SVM.model_copy(update={"tracker": tracker})

@@ -107,9 +107,8 @@ def test_hidden_files_are_passed_over(tmp_path: Path, form: str) -> None:
     for folder in (file.parent, next(tmp_path.rglob("a.png")).parent):
         for name in (f"._{file.name}", "._a.png", ".DS_Store", "Thumbs.db"):
             (folder / name).write_bytes(b"\0\5")
-    assert [picture.path.name for picture in read_labelled_images(tmp_path).images] == [
-        *("a.png", "b.png")
-    ]
+    found = [picture.path.name for picture in read_labelled_images(tmp_path).images]
+    assert found == ["a.png", "b.png"]
 
 
 def scene_of(*boxes: tuple[float, float, float, float]) -> Pictures:

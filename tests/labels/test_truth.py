@@ -57,9 +57,8 @@ def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> No
     tracks = [car(number, class_name=name) for number, name in enumerate(kinds, start=1)]
     path.write_bytes(written(form, [frame(2, *tracks)]))
     ((index, labels),) = read_truth(path).frames.items()
-    assert [(index, label.id, label.score) for label in labels] == [
-        *((2, 1, 1), (2, 2, 1), (2, 3, 1))
-    ]
+    assert index == 2
+    assert [(label.id, label.score) for label in labels] == [(1, 1), (2, 1), (3, 1)]
     assert {label.box for label in labels} == {Box(10, 20, 40, 60)}
     assert [label.ignored for label in labels] == [False, False, True]
 
@@ -234,11 +233,8 @@ def test_frames_ascend_where_a_set_of_their_numbers_does_not() -> None:
 
 
 def test_blank_lines_count_and_a_byte_order_mark_is_no_text() -> None:
-    assert list(numbered_lines(Path("a"), b"\xef\xbb\xbfa\r\n\r\n b \nc")) == [
-        (1, "a"),
-        (3, "b"),
-        (4, "c"),
-    ]
+    lines = list(numbered_lines(Path("a"), b"\xef\xbb\xbfa\r\n\r\n b \nc"))
+    assert lines == [(1, "a"), (3, "b"), (4, "c")]
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", bytes(range(256))])

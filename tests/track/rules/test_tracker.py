@@ -43,9 +43,8 @@ def ids(tracks: list[Track]) -> list[int]:
 # Rule 1
 def test_regions_that_are_too_small_are_ignored() -> None:
     settings = tracker_but(detections_needed=1)
-    assert see(
-        RulesTracker(settings), Box.sized(100, 200, 49, 80), Box.sized(300, 200, 80, 49)
-    ) == [[]]
+    narrow, flat = Box.sized(100, 200, 49, 80), Box.sized(300, 200, 80, 49)
+    assert see(RulesTracker(settings), narrow, flat) == [[]]
     assert len(see(RulesTracker(settings), Box.sized(100, 200, 50, 50))[0]) == 1
 
 
