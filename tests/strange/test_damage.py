@@ -1,6 +1,5 @@
 """Damage in a file: the rest is processed, the loss is reported, and too much of it is an error."""
 
-from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -87,12 +86,4 @@ def test_damage_after_the_last_frame_read_does_not_count(tmp_path: Path, process
     source = damaged(tmp_path, "mp4", [31, 32, 33, 34])
     shown = process(source, "--frames", "25")
     assert [read_number(image) for image in shown.images] == list(range(25))
-    assert shown.warnings == []
-
-
-def test_frames_that_were_never_recorded_are_not_lost(tmp_path: Path, process: Process) -> None:
-    times = [Fraction(index, 25) for index in range(COUNT) if index not in {11, 22, 33, 34}]
-    source = write_clip(tmp_path / "gaps.mp4", times=times)
-    shown = process(source)
-    assert shown.times == times
     assert shown.warnings == []
