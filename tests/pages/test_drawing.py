@@ -4,7 +4,6 @@ import json
 import random
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import pytest
 from benchmarks.pole_cameras import pole_scene
 
 from browser import CONTROL, DELETE, ENTER, ESCAPE, SHIFT, Browser, browser, downloaded
-from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, counts, frames, settings_for, through
+from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, counts, frames, named, settings_for, through
 from vdet.boxes import Box
 from vdet.config.loading import given_values, load_settings, parse_document
 from vdet.config.schema import Settings
@@ -255,12 +254,7 @@ def test_known_lengths_along_a_lane_give_the_ground_and_its_width_alone_no_speed
 def test_metres_by_which_cars_are_far_too_wide_have_a_warning(
     window: Browser, tmp_path: Path
 ) -> None:
-    video = frames(*DOWN)
-    cars = [
-        replace(frame, tracks=tuple(replace(track, class_name="car") for track in frame.tracks))
-        for frame in video
-    ]
-    window.open(written(tmp_path, drawing(cars)))
+    window.open(written(tmp_path, drawing(named(frames(*DOWN), "car"))))
     for width in (8, 100):
         window.type("m")
         window.click((300, 700), (500, 300), (1000, 700), (800, 300))

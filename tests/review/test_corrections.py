@@ -16,6 +16,7 @@ from traffic.scenes import (
     ZONE,
     frames,
     joined,
+    named,
     numbered,
     settings_for,
     through,
@@ -43,11 +44,7 @@ def counts() -> Counts:
         frames(through((1, 500, 200), (4, 500, 700)), seconds=10),
         numbered(frames(through((5, 900, 200), (8, 900, 700)), seconds=10), 2),
     )
-    named = [
-        replace(frame, tracks=tuple(replace(one, class_name="car") for one in frame.tracks))
-        for frame in video
-    ]
-    return count_frames(named, SETTINGS, SIZE)
+    return count_frames(named(video, "car"), SETTINGS, SIZE)
 
 
 def saved(path: Path, *events: dict[str, Any], **values: Any) -> Path:
@@ -61,9 +58,9 @@ def error(
     event: Event, kind: str | None, correct: str | None = None, **values: Any
 ) -> dict[str, Any]:
     """Return what a reviewer says of an event; an error of None: it was counted rightly."""
-    named = {"line": event.name, "time": round(event.time, 2), "direction": event.direction}
-    named |= {"class": event.class_name, "id": event.id, "error": kind}
-    return named | ({"correct": correct} if correct else {}) | values
+    told = {"line": event.name, "time": round(event.time, 2), "direction": event.direction}
+    told |= {"class": event.class_name, "id": event.id, "error": kind}
+    return told | ({"correct": correct} if correct else {}) | values
 
 
 def missed(time: float, class_name: str = "bus") -> dict[str, Any]:
@@ -261,12 +258,12 @@ def test_several_videos_are_corrected_by_the_files_that_name_them(tmp_path: Path
         saved(tmp_path / "2.yaml", missed(8.5), video="b.mp4"),
         saved(tmp_path / "3.yaml", error(videos["b"].events[0], "class", "bus"), video="b.mp4"),
     ]
-    named = {
+    counted = {
         key: replace(video, source=SourceVideo(f"{key}.mp4", *SIZE))
         for key, video in videos.items()
     }
     reviews = [Corrections.read(path) for path in files]
-    after = apply_corrections(named, reviews, SETTINGS)
+    after = apply_corrections(counted, reviews, SETTINGS)
     assert [(one.class_name, one.vehicle) for one in after["a"].events] == [("bus", 1), ("bus", 3)]
     assert [(one.class_name, one.vehicle) for one in after["b"].events] == [
         ("bus", 1), ("car", 2), ("bus", 4),

@@ -87,6 +87,14 @@ def numbered(video: Iterable[FrameTracks], number: int) -> list[FrameTracks]:
     ]
 
 
+def named(video: Iterable[FrameTracks], name: str) -> list[FrameTracks]:
+    """Give the tracks a class."""
+    return [
+        replace(frame, tracks=tuple(replace(t, class_name=name) for t in frame.tracks))
+        for frame in video
+    ]
+
+
 LINE = LineSettings(name="line", start=(200, 400), end=(1000, 400), left="away", right="here")
 """From left to right across the road: vehicles that come nearer cross it to its right."""
 ZONE = ZoneSettings(name="zone", points=((400, 300), (800, 300), (800, 500), (400, 500)))

@@ -1,7 +1,7 @@
 """Flows from one line or zone to another, and tables by interval."""
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from running import rows_of
-from traffic.scenes import ZONE, counts, frames, joined, numbered, through
+from traffic.scenes import ZONE, counts, frames, joined, named, numbered, through
 from vdet.config.scene import LineSettings
 from vdet.errors import ConfigError
 from vdet.findings import Finding
@@ -36,13 +36,6 @@ def crossing(*shapes: LineSettings) -> Counts:
 
 def at(counted: Counts, begin: datetime = BEGINS) -> Counts:
     return replace(counted, clock=Clock(begin, "as given", begin.tzinfo))
-
-
-def named(video: Iterable[FrameTracks], name: str) -> list[FrameTracks]:
-    return [
-        replace(frame, tracks=tuple(replace(t, class_name=name) for t in frame.tracks))
-        for frame in video
-    ]
 
 
 def test_a_flow_leads_from_the_first_line_of_a_vehicle_to_the_last() -> None:

@@ -1,7 +1,6 @@
 """Which vehicles count, with which class, and what becomes of them when their id changes."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -14,6 +13,7 @@ from traffic.scenes import (
     feet,
     frames,
     joined,
+    named,
     numbered,
     through,
     track,
@@ -107,17 +107,8 @@ def test_times_that_no_video_has_are_refused(times: tuple[float, float]) -> None
 
 
 def test_a_class_that_flips_on_the_line_does_not_split_the_history() -> None:
-    video = [
-        replace(
-            frame,
-            tracks=tuple(
-                replace(t, class_name="truck" if 1.8 < frame.time < 2.2 else "car")
-                for t in frame.tracks
-            ),
-        )
-        for frame in frames(DOWN)
-    ]
-    (event,) = events(video)
+    cars, trucks = (named(frames(DOWN), name) for name in ("car", "truck"))
+    (event,) = events([*cars[:45], *trucks[45:55], *cars[55:]])
     assert event.class_name == "car"
 
 
