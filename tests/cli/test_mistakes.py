@@ -133,6 +133,10 @@ REFUSED = {
     "eval images set --set detector.kind=sonar": "sonar: unknown detector",
     f"eval images set {REGION}": "regions: this command uses whole frames",
     f"eval tracks t.txt gt.txt {REGION}": "regions: this command uses whole frames; remove the ",
+    "eval tracks t.txt gt.txt --json old.npz": "old.npz: already exists; use --overwrite to ",
+    "eval tracks t.txt gt.txt --json gt.txt --overwrite": "gt.txt: is an input of this run",
+    "eval tracks t.txt gt.txt --json x/page.html --page x": "page.html: is used for two outputs",
+    "eval tracks t.txt gt.txt --page old": "old/page.html: already exists; use --overwrite to ",
     "eval tracks t.txt short.txt": "short.txt:2: ",
     "eval video in.mp4 --truth none.txt": "none.txt: cannot be read",
     "eval video in.mp4 --truth gt.txt -c svm --set detector.features.hog.cell=8": "no shipped mod",
@@ -158,6 +162,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("inputs")
     write_drive(folder / "in.mp4", 12)
     (folder / "twin" / "none").mkdir(parents=True)
+    (folder / "old").mkdir()
     for image in (folder / "frame.png", folder / "twin" / "frame.png"):
         write_image(image, np.full((240, 320, 3), 90, np.uint8))
     write_coco(folder / "set", {"a": Labelled(320, 240, (Boxed("car", (120, 120, 60, 40)),))})
@@ -174,6 +179,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "half.yaml": "traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}",
         "short.yaml": "traffic: {lines: [{name: gate, start: [1, 0.5], end: [0.999, 0.5]}]}",
         "old.npz": "precious",
+        "old/page.html": "precious",
         "empty.mp4": "",
     }
     for name, text in texts.items():
