@@ -103,11 +103,8 @@ def test_people_in_tracks_of_another_tool_are_counted_only_if_chosen(
 def test_tracks_of_a_video_whose_name_is_not_utf8_can_be_counted(
     run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...], form: str
 ) -> None:
-    clip, tracks, fixes = (
-        tmp_path / "caf\udce9.mp4",
-        tmp_path / f"t.{form}",
-        tmp_path / "fixes.yaml",
-    )
+    clip, fixes = tmp_path / "caf\udce9.mp4", tmp_path / "fixes.yaml"
+    tracks = tmp_path / f"t.{form}"
     clip.write_bytes((folder / "red.mp4").read_bytes())
     lines = ("-c", folder / "lines.yaml")
     run("detect-video", clip, "--no-video", "--tracks", tracks, *red, code=0)
@@ -289,10 +286,8 @@ def test_lines_in_fractions_are_counted_at_in_frames_of_a_given_size(
 
 
 def test_the_manifest_of_a_batch_is_skipped(run: Run, tmp_path: Path) -> None:
-    write_tracks(tmp_path / "t.csv")
+    tracks, manifest = write_tracks(tmp_path / "t.csv"), tmp_path / "manifest.jsonl"
     (tmp_path / "l.yaml").write_text(LINES)
-    (tmp_path / "manifest.jsonl").write_text("{}\n")
-    result = run(
-        "count", tmp_path / "manifest.jsonl", tmp_path / "t.csv", "-c", tmp_path / "l.yaml"
-    )
+    manifest.write_text("{}\n")
+    result = run("count", manifest, tracks, "-c", tmp_path / "l.yaml")
     assert (result.code, result.err) == (0, "")

@@ -78,10 +78,8 @@ def test_what_vdet_wrote_and_what_is_no_video_is_replaced(
 
 
 def test_only_reading_decides_whether_a_time_is_beyond_the_end(run: Run, tmp_path: Path) -> None:
-    clip, out = (
-        write_foreign(tmp_path / "clip.mkv", count=250, options={"g": "10"}),
-        tmp_path / "o.mp4",
-    )
+    clip = write_foreign(tmp_path / "clip.mkv", count=250, options={"g": "10"})
+    out = tmp_path / "o.mp4"
     declared = struct.pack(">d", 10_000), struct.pack(">d", 333)  # ms
     content = clip.read_bytes().replace(*declared).replace(b"00:00:10.000", b"00:00:00.333")
     clip.write_bytes(content)

@@ -96,8 +96,6 @@ def test_saved_tracks_must_be_of_frames_of_this_size(run: Run, red: tuple[str, .
     Path("t.jsonl").write_text(text)
     result = run("draw", "moved.mp4", "--tracks-from", "t.jsonl", "-o", "other.html", code=1)
     assert result.err == "vdet: t.jsonl: is of 640×240 frames, not 320×240\n"
-    result = run("draw", "frame.png", "--tracks-from", "t.jsonl", "-o", "other.html", code=1)
-    assert result.err == "vdet: t.jsonl: is of 640×240 frames, not 320×240\n"
 
 
 def test_the_page_has_only_the_classes_that_are_counted(run: Run) -> None:
