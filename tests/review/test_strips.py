@@ -27,8 +27,12 @@ def test_each_vehicle_leaves_one_streak_with_its_mark(tmp_path: Path, run: Run) 
         assert seconds == pytest.approx(car.time + (-0.15 if car.goes_up else 0.15), abs=0.1)
 
 
-def test_each_counted_vehicle_has_its_best_picture(tmp_path: Path, run: Run) -> None:
+def test_a_missed_vehicle_is_a_streak_without_a_mark_and_a_counted_one_has_a_picture(
+    tmp_path: Path, run: Run
+) -> None:
     page = read_page(reviewed(run, tmp_path, missed=2))
+    assert len(page.streaks(0)) == 3
+    assert [mark["id"] for mark in page.data["marks"] if mark["seconds"] < 60] == [1, 2]
     assert set(page.crops) == {1, 2, 4, 5}
     for picture in page.crops.values():
         assert picture.shape == (28, 28, 3)  # a car and a tenth around it
@@ -61,12 +65,6 @@ def test_coarse_pages_have_no_readable_faces_or_plates(tmp_path: Path, run: Run)
     assert before == 200 * columns, "40 pixels of the frame, 24 of which are the car"
     assert after == pytest.approx(before * 40 / (200 * 24 / 40), rel=0.02)
     assert pages[0].data["marks"] == pages[1].data["marks"]
-
-
-def test_a_missed_vehicle_is_a_streak_without_a_mark(tmp_path: Path, run: Run) -> None:
-    page = read_page(reviewed(run, tmp_path, missed=2))
-    assert len(page.streaks(0)) == 3
-    assert [mark["id"] for mark in page.data["marks"] if mark["seconds"] < 60] == [1, 2]
 
 
 def test_the_live_review_equals_that_of_saved_tracks(tmp_path: Path, run: Run) -> None:
