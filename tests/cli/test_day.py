@@ -5,7 +5,7 @@ from pathlib import Path
 from browser import ENTER, browser
 from cli.test_count_command import LINES
 from conftest import Run
-from running import write_drive
+from running import rows_of, write_drive
 
 
 def test_the_pages_of_a_day_are_linked(run: Run, tmp_path: Path, red: tuple[str, ...]) -> None:
@@ -16,8 +16,12 @@ def test_the_pages_of_a_day_are_linked(run: Run, tmp_path: Path, red: tuple[str,
     settings = tmp_path / "lines.yaml"
     settings.write_text(LINES)
     (day / "c.mp4").write_bytes(b"no video")
-    outputs = ("--review", ".review", "--page", ".page", "--clips", ".clips")
+    pages = ("--review", ".review", "--page", ".page", "--clips", ".clips")
+    outputs = (*pages, "--counts", ".counts.csv", "--flows", ".flows.csv")
     run("detect-video", day, "-d", out, "--no-video", *red, "-c", settings, *outputs, code=3)
+    for table in ("counts", "flows"):
+        of_each = [rows_of(out / f"{name}/{name}.{table}.csv") for name in ("a", "b")]
+        assert of_each[0] == of_each[1] != []
 
     with browser(tmp_path) as window:
         window.visit(out / "reviews.html")
