@@ -2,17 +2,13 @@
 
 import pytest
 
-from red_cars import HEIGHT, SETTINGS, WIDTH, drive
+from red_cars import SETTINGS, drive
 from run.red_runs import follow
-from vdet.config.scene import CameraSettings, LensSettings
+from run.sinks.test_overlay import LENS
+from vdet.config.scene import CameraSettings
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import Undistorter
 
-LENS = LensSettings(
-    size=(WIDTH, HEIGHT),
-    matrix=((240, 0, 160), (0, 240, 120), (0, 0, 1)),
-    distortion=(-0.35, 0.1, 0.0, 0.0, 0.0),
-)
 WITH_LANES = SETTINGS.model_copy(
     update={"camera": CameraSettings(lens=LENS), "lanes": LaneSettings(enabled=True)}
 )
