@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from learn.net.blocks import block_picture, block_source
+from vdet.boxes import coverage
 from vdet.config.schema import NetworkTrainingSettings
 from vdet.learn.net.augmentation import (
     ImageDrawing,
     SampleDrawer,
     rare_objects,
     repeat_factors,
+    whole_objects,
+    with_occlusion,
     with_rare_objects,
     with_signs,
     with_weather,
@@ -129,7 +132,7 @@ def test_signs_are_background_and_cover_no_object() -> None:
 def test_objects_of_rare_classes_are_pasted_with_their_boxes() -> None:
     blocks = [replace(e, classes=np.zeros_like(e.classes)) for e in block_source(20).samples]
     [white] = black_on_white().samples
-    rare = rare_objects([*blocks, replace(white, classes=np.array([1]))])
+    rare = rare_objects(whole_objects([*blocks, replace(white, classes=np.array([1]))]))
     plain = without_objects(np.full((352, 640, 3), 255, np.uint8))
     drawn = [with_rare_objects(np.random.default_rng(seed), plain, rare) for seed in range(40)]
     pasted = [item for item in drawn if len(item.boxes)]
@@ -142,6 +145,21 @@ def test_objects_of_rare_classes_are_pasted_with_their_boxes() -> None:
         for left, top, right, bottom in sample.boxes.round().astype(int):
             inside[top:bottom, left:right] = True
         assert np.mean(dark == inside) > 0.99
+
+
+def test_vehicles_are_pasted_in_front_of_others_which_keep_their_boxes() -> None:
+    [block] = black_on_white().samples
+    drawn = [
+        with_occlusion(np.random.default_rng(seed), block, whole_objects([block]))
+        for seed in range(100)
+    ]
+    pairs = [sample for sample in drawn if len(sample.boxes) == 2]
+    assert 15 <= len(pairs) <= 60
+    for sample in pairs:
+        behind, front = sample.boxes.astype(np.float64)
+        assert np.array_equal(behind, block.boxes[0])
+        assert front[3] >= behind[3] - 1, "what is nearer is lower"
+        assert 0.05 < coverage(behind[np.newaxis], front[np.newaxis])[0, 0] < 0.8
 
 
 def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:

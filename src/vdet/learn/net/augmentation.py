@@ -288,12 +288,23 @@ _MARGIN = 0.2  # surroundings of a pasted object on each side, fraction of the b
 _MIN_DONOR = 24.0  # longer side of an object to paste, pixels
 _PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the image's height
 _MAX_COVERED = 0.45  # maximum fraction of another object that a pasted one hides
+_MAX_ENLARGED = 1.5  # of the pixels of a pasted object
+_OCCLUDED = 0.4  # fraction of images in which an object is pasted in front of another one
+_FRONT_CLASSES = 3  # an object in front is one of the first classes: car, truck, bus
+_FRONT_SIDES = 0.9, 1.4  # its longer side, as a multiple of that of the object behind it
+_FRONT_MARGIN = 0.06  # its surroundings: few, as they cover the object behind it
+_OVERLAP = 0.2, 0.6  # width that it covers, fraction of that of the narrower object
+_LOWER = 0.3  # how much lower it may be, as it is nearer, fraction of its height
+_MAX_OCCLUDED = 0.75  # maximum fraction of another object that it covers
 _SIGNS = 0.3  # fraction of images that get signs
 _MAX_SIGNS = 3  # signs in an image
 
 
-Objects = Sequence[Sequence[tuple[NetSample, int]]]
-"""The objects of each class: a sample, and the row of the object in it."""
+SampleObject = tuple[NetSample, int]
+"""A sample, and the row of an object in it."""
+
+Objects = Sequence[Sequence[SampleObject]]
+"""The objects of each class."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,7 +340,8 @@ class SampleDrawer:
         chances /= chances.sum()
         chances *= repeat_factors(self._samples, chances, REPEAT_THRESHOLD)
         self._chances = chances / chances.sum()
-        self._rare = rare_objects(self._samples)
+        self._objects = whole_objects(self._samples)
+        self._rare = rare_objects(self._objects)
 
     def draw(self, rng: np.random.Generator, drawing: ImageDrawing) -> NetSample:
         """Return one training image with the vehicles in it."""
@@ -343,7 +355,8 @@ class SampleDrawer:
             sample = _random_view(rng, self._pick(rng), size, scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        sample = with_signs(rng, with_rare_objects(rng, sample, self._rare))
+        sample = with_occlusion(rng, with_rare_objects(rng, sample, self._rare), self._objects)
+        sample = with_signs(rng, sample)
         sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
         may_have_lamps = ~sample.ignored & (sides[:, 0] > 0.45 * sides[:, 1])  # people have none
         image = _recolored(rng, sample.image)
@@ -394,14 +407,19 @@ def repeat_factors(
     return np.asarray(factors.max(axis=1).clip(1.0), np.float64)
 
 
-def rare_objects(samples: Sequence[NetSample]) -> Objects:
-    """Return the objects of each rare class that can be pasted into images."""
-    objects: dict[int, list[tuple[NetSample, int]]] = {}
+def whole_objects(samples: Sequence[NetSample]) -> Objects:
+    """Return the objects that can be pasted into images."""
+    objects: dict[int, list[SampleObject]] = {}
     for sample in samples:
         for row in _whole(sample):
             objects.setdefault(int(sample.classes[row]), []).append((sample, row))
-    limit = _RARE * sum(map(len, objects.values())) / max(1, len(objects))
-    return [of_class for _, of_class in sorted(objects.items()) if len(of_class) < limit]
+    return [of_class for _, of_class in sorted(objects.items())]
+
+
+def rare_objects(objects: Objects) -> Objects:
+    """Return those of the classes that have few."""
+    limit = _RARE * sum(map(len, objects)) / max(1, len(objects))
+    return [of_class for of_class in objects if len(of_class) < limit]
 
 
 def with_rare_objects(rng: np.random.Generator, sample: NetSample, rare: Objects) -> NetSample:
@@ -414,9 +432,34 @@ def with_rare_objects(rng: np.random.Generator, sample: NetSample, rare: Objects
     sample = replace(sample, image=sample.image.copy())
     for _ in range(int(rng.integers(1, _MAX_PASTED + 1))):
         of_class = rare[int(rng.integers(len(rare)))]
-        donor, row = of_class[int(rng.integers(len(of_class)))]
-        sample = _paste(rng, sample, donor, row)
+        sample = _paste(rng, sample, of_class[int(rng.integers(len(of_class)))])
     return sample
+
+
+def with_occlusion(rng: np.random.Generator, sample: NetSample, objects: Objects) -> NetSample:
+    """Sometimes paste an object of the first classes in front of a part of another object.
+
+    Without such images, of two vehicles that stand one behind the other often one is found.
+    """
+    sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
+    rows = np.flatnonzero(~sample.ignored & (sides.max(axis=1, initial=0) >= _MIN_DONOR))
+    if not objects or rng.random() >= _OCCLUDED or not len(rows):
+        return sample
+    row = int(rng.choice(rows))
+    of_class = objects[int(rng.integers(min(_FRONT_CLASSES, len(objects))))]
+    item = of_class[int(rng.integers(len(of_class)))]
+    item_sides = item[0].boxes[item[1], 2:] - item[0].boxes[item[1], :2]
+    factor = float(sides[row].max() / item_sides.max()) * _scale(rng, _FRONT_SIDES)
+    if factor > _MAX_ENLARGED:
+        return sample
+    width, height = factor * item_sides
+    x1, _, x2, y2 = sample.boxes[row]
+    hidden = rng.uniform(*_OVERLAP) * min(width, x2 - x1)
+    x = x2 - hidden if rng.random() < 0.5 else x1 + hidden - width
+    y = y2 + rng.uniform(0, _LOWER) * height - height  # nearer, and so lower
+    sample = replace(sample, image=sample.image.copy())
+    limits = _PasteLimits(margin=_FRONT_MARGIN, covered=_MAX_OCCLUDED)
+    return _placed(sample, item, factor, (x, y), limits)
 
 
 def _whole(sample: NetSample) -> list[int]:
@@ -432,28 +475,60 @@ def _whole(sample: NetSample) -> list[int]:
     return [int(row) for row in np.flatnonzero(is_whole)]
 
 
-def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: int) -> NetSample:
+def _paste(rng: np.random.Generator, sample: NetSample, item: SampleObject) -> NetSample:
     """Paste one object into the image of a sample, unless it would cover others."""
     height, width = sample.image.shape[:2]
-    box, limits = donor.boxes[row], np.array(donor.image.shape[1::-1] * 2)
-    longer = float((box[2:] - box[:2]).max())
-    largest = max(_PASTED_SIDES[0], min(_PASTED_SIDES[1] * height, 1.5 * longer))
+    donor, row = item
+    sides = donor.boxes[row, 2:] - donor.boxes[row, :2]
+    longer = float(sides.max())
+    largest = max(_PASTED_SIDES[0], min(_PASTED_SIDES[1] * height, _MAX_ENLARGED * longer))
     factor = _scale(rng, (_PASTED_SIDES[0], largest)) / longer
-    margin = _MARGIN * np.tile(box[2:] - box[:2], 2) * (-1, -1, 1, 1)
-    left, top, right, bottom = np.clip(box + margin, 0, limits).round().astype(int).tolist()
+    wide, tall = (1 + 2 * _MARGIN) * factor * sides
+    free = height - tall - height // 4  # never near the top, where the sky is
+    if free <= 0 or wide >= width:
+        return sample
+    x = rng.uniform(0, width - wide) + _MARGIN * factor * sides[0]
+    y = height // 4 + rng.uniform(0, free) + _MARGIN * factor * sides[1]
+    limits = _PasteLimits(margin=_MARGIN, covered=_MAX_COVERED)
+    return _placed(sample, item, factor, (x, y), limits)
+
+
+@dataclass(frozen=True, slots=True)
+class _PasteLimits:
+    """The margin around a pasted object, and how much of another it may cover, fractions."""
+
+    margin: float
+    covered: float
+
+
+def _placed(
+    sample: NetSample,
+    item: SampleObject,
+    factor: float,
+    corner: tuple[float, float],
+    limits: _PasteLimits,
+) -> NetSample:
+    """Paste an object, scaled by `factor`, with its upper left corner at a point of a sample.
+
+    The sample stays as it is where the object would reach out of the image or cover too much.
+    """
+    donor, row = item
+    box, ends = donor.boxes[row], np.array(donor.image.shape[1::-1] * 2)
+    margin = limits.margin * np.tile(box[2:] - box[:2], 2) * (-1, -1, 1, 1)
+    left, top, right, bottom = np.clip(box + margin, 0, ends).round().astype(int).tolist()
     method = cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR
     patch = cv2.resize(
         donor.image[top:bottom, left:right], None, fx=factor, fy=factor, interpolation=method
     )
     rows, columns = patch.shape[:2]
-    free = height - rows - height // 4  # never near the top, where the sky is
-    if free <= 0 or columns >= width:
-        return sample
-    x, y = int(rng.integers(width - columns)), height // 4 + int(rng.integers(free))
     inner = (box - np.array([left, top] * 2)) * factor
+    x, y = round(corner[0] - inner[0]), round(corner[1] - inner[1])
+    height, width = sample.image.shape[:2]
+    if x < 0 or y < 0 or x + columns > width or y + rows > height:
+        return sample
     pasted_box = (inner + np.array([x, y] * 2)).astype(np.float32)[np.newaxis]
     objects = sample.boxes[~sample.ignored].astype(np.float64)
-    if coverage(objects, pasted_box.astype(np.float64)).max(initial=0) > _MAX_COVERED:
+    if coverage(objects, pasted_box.astype(np.float64)).max(initial=0) > limits.covered:
         return sample
     part = sample.image[y : y + rows, x : x + columns]
     opacity = _feather(columns, inner[0], inner[2]) * _feather(rows, inner[1], inner[3])[:, None]
