@@ -98,7 +98,7 @@ def test_heavy_rain_does_not_move_the_camera() -> None:
     for time in np.arange(0, 20, 0.25).tolist():
         plane = view(0, 0, 0) // 2
         for x, y in rng.integers((0, 0), (WIDTH, HEIGHT - 8), (300, 2)):
-            plane[y : y + 8, x] += 60
+            plane[y : y + 8, x] = 200
         watch.add(time, plane, [], is_clear=True)
     assert watch.is_still
     assert codes(watch) == []

@@ -26,10 +26,13 @@ _AGREEING = 0.5
 """Fraction of the corners that must agree with a similarity."""
 _IN_PLACE = 0.75
 """Minimum correlation of the edges of two planes of one view, where no similarity is found: it is
-0.8 to 1 before fixed cameras, also under clouds and by night, and 0.3 to 0.8 while driving. The
-planes are minima of `_PLANES` each, without rain and snow, which are bright and never in one place.
+0.8 to 1 before fixed cameras, also under clouds, by night and in rain, and 0.4 to 0.8 while
+driving.
 """
-_PLANES = 3
+_MINIMUM_OF = 3
+"""Maximum number of planes whose minimum is compared: it shows neither rain nor snow, which are
+bright and never twice in one place.
+"""
 _ERROR = 0.3
 """Displacement within the error of measurement, pixels of a plane."""
 _RENEWED = 30.0
@@ -55,8 +58,8 @@ class CameraWatch:
         """
         self._planes = self._still_planes = self._lost_planes = 0
         self._plane: Image | None = None
-        self._recent, self._first = deque[Image](), list[Image]()
-        """The last planes, and up to as many before, from where the corners were chosen."""
+        self._latest, self._reference_planes = deque[Image](), list[Image]()
+        """The latest planes, and those around the one in which the corners were chosen."""
         self._points = np.empty((0, 1, 2), np.float32)
         self._reference = np.zeros((4, 2))
         self._since = 0.0
@@ -68,9 +71,10 @@ class CameraWatch:
         good: otherwise a view that is not found may be the same.
         """
         plane = np.asarray(self._even.apply(plane), np.uint8)
-        self._recent.append(plane)
-        if len(self._recent) > _PLANES:
-            self._first = [*self._first, self._recent.popleft()][:_PLANES]
+        self._latest.append(plane)
+        if len(self._latest) > _MINIMUM_OF:
+            planes = [*self._reference_planes, self._latest.popleft()]
+            self._reference_planes = planes[:_MINIMUM_OF]
         moved = self._moved(plane, np.inf if is_clear else np.nan)
         position = self._reference + moved / plane.shape[1]
         with np.errstate(invalid="ignore"):  # both may be other views
@@ -85,14 +89,14 @@ class CameraWatch:
             if np.abs(moved).max() > _ERROR:  # so that small errors do not add up
                 self._reference = position
             self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
-            self._first = list(self._recent)
-            self._recent.clear()
+            self._reference_planes = list(self._latest)
+            self._latest.clear()
         return is_steady
 
     def restart(self) -> None:
         """Take the next plane for the view from now on."""
         self._plane, self._points = None, np.empty((0, 1, 2), np.float32)
-        self._recent.clear()
+        self._latest.clear()
         self._reference = np.zeros((4, 2))
 
     @property
@@ -154,7 +158,7 @@ class CameraWatch:
         else:
             lost = np.nan
         with np.errstate(invalid="ignore"):  # a plane without edges
-            agreement = np.corrcoef(_edges(self._first), _edges(self._recent))[0, 1]
+            agreement = np.corrcoef(_edges(self._reference_planes), _edges(self._latest))[0, 1]
         return np.full((4, 2), 0.0 if agreement >= _IN_PLACE else lost)
 
 
@@ -261,7 +265,7 @@ def _distances(positions: Float64Array, usual: Float64Array) -> Float64Array:
 
 
 def _edges(planes: Sequence[Image]) -> Float32Array:
-    """Return the edges of the minimum of some planes, flat.
+    """Return the edges of the pixelwise minimum of planes `(h, w)`, as `(h * w,)`.
 
     They are limited, so that many weak ones count like a few strong ones.
     """

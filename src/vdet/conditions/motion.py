@@ -77,8 +77,8 @@ _SLOW = 0.2
 _MIN_MOVERS, _MIN_FRACTION = 2, 0.15
 """Minimum number of movers, and minimum fraction of all that travelled, for a finding."""
 _FAR = 0.25
-"""Distance of a mover that is doubtful alone, as a fraction of the frame's width, where nothing is
-tracked: in 80 drawn clips, one branch of a tree moved by at most 0.19 in each of 5, in no other.
+"""Minimum distance of a single mover for a finding where nothing is tracked, as a fraction of the
+frame's width. In 5 of 80 drawn clips of trees, a single branch moved, by at most 0.19.
 """
 _FORGOTTEN = 10.0
 """Seconds after which the start of a track is forgotten."""
@@ -221,7 +221,8 @@ class MotionWatch:
 
     def _nothing_found(self) -> list[Finding]:
         """Return the finding about a video without a single track."""
-        if self._missed >= _MIN_MOVERS or self._farthest >= _FAR * self._covered.shape[1]:
+        is_far = self._farthest >= _FAR * self._covered.shape[1]
+        if self._missed >= _MIN_MOVERS or is_far or self._crossed:
             places = "".join(f", {number} across {name}" for name, number in self._crossed.items())
             text = (
                 f"no vehicle was found, but at least {quantity(self._missed, 'thing')} moved here"
@@ -230,7 +231,7 @@ class MotionWatch:
             return [Finding("nothing-found", text, tuple(self._spans), value=float(self._missed))]
         text = "no vehicle was found, and nothing moved"
         if self._missed or self._others:
-            text = "no vehicle was found; what moved here does not look like one"
+            text = "no vehicle was found; nothing moved here as vehicles do"
         return [Finding("nothing-found", text, severity="note")]
 
     def _link(self, time: float, areas: list[_Area], before: Image) -> None:

@@ -187,8 +187,9 @@ def make_steps(context: StepContext) -> list[Step]:
         from vdet.conditions.watch import Conditions
 
         conditions = Conditions(settings, width)
-        min_score = settings.tracker.min_score_standing
-        steps += [ConditionStep(conditions), StandingStep(conditions, min_score, width)]
+        steps.append(ConditionStep(conditions))
+        if min_score := settings.tracker.min_score_standing:
+            steps.append(StandingStep(conditions, min_score, width))
     if settings.lanes.enabled:
         from vdet.lanes.road import RoadFinder
 
@@ -277,11 +278,11 @@ class ConditionStep:
 
 
 class StandingStep:
-    """Hides the tracks that have not moved and score low, if the camera is fixed.
+    """Hides the tracks that have not moved and are doubtful, if the camera is fixed.
 
-    They are usually signs or buildings. A track is shown as soon as it moves, reaches the score
-    while its classes agree, or another one has driven where it is. On two signs of three real
-    clips, whose scores reach 0.81 and 0.74, the classes disagree.
+    They are usually signs or buildings. A track is shown once it moves, reaches the score with a
+    clear class, or stands where another vehicle drove. Two signs in three real clips score up to
+    0.81 and 0.74, but their classes disagree.
     """
 
     def __init__(self, conditions: "Conditions", min_score: float, width: int) -> None:
@@ -295,12 +296,13 @@ class StandingStep:
 
     def apply(self, result: FrameResult) -> FrameResult:
         """Keep the tracks to show; all, if the camera moves."""
+        has_one_class = result.detections.names == (UNKNOWN,)
         for track in result.tracks:
             start = self._starts.setdefault(track.id, track.foot)
             if has_moved(math.dist(start, track.foot), track.box.size):
                 self._driven.add(self._cell_of(*track.foot))
                 self._shown.add(track.id)
-            elif track.score >= self._min_score and track.class_name != UNKNOWN:
+            elif track.score >= self._min_score and (has_one_class or track.class_name != UNKNOWN):
                 self._shown.add(track.id)
         if self._conditions.is_moving:
             return result
