@@ -221,8 +221,7 @@ class MotionWatch:
 
     def _nothing_found(self) -> list[Finding]:
         """Return the finding about a video without a single track."""
-        is_far = self._farthest >= _FAR * self._covered.shape[1]
-        if self._missed >= _MIN_MOVERS or is_far or self._crossed:
+        if self._missed >= _MIN_MOVERS or self._farthest >= _FAR * self._covered.shape[1]:
             places = "".join(f", {number} across {name}" for name, number in self._crossed.items())
             text = (
                 f"no vehicle was found, but at least {quantity(self._missed, 'thing')} moved here"
@@ -230,8 +229,10 @@ class MotionWatch:
             )
             return [Finding("nothing-found", text, tuple(self._spans), value=float(self._missed))]
         text = "no vehicle was found, and nothing moved"
-        if self._missed or self._others:
-            text = "no vehicle was found; nothing moved here as vehicles do"
+        if self._missed:
+            text = f"no vehicle was found; one thing moved, but not far, {when(self._spans)}"
+        elif self._others:
+            text = "no vehicle was found; what moved here does not look like one"
         return [Finding("nothing-found", text, severity="note")]
 
     def _link(self, time: float, areas: list[_Area], before: Image) -> None:

@@ -150,7 +150,7 @@ def test_objects_of_rare_classes_are_pasted_with_their_boxes() -> None:
 def test_vehicles_are_pasted_in_front_of_others_which_keep_their_boxes() -> None:
     [block] = black_on_white().samples
     drawn = [
-        with_occlusion(np.random.default_rng(seed), block, whole_objects([block]))
+        with_occlusion(np.random.default_rng(seed), block, [*whole_objects([block]).values()])
         for seed in range(100)
     ]
     pairs = [sample for sample in drawn if len(sample.boxes) == 2]

@@ -6,7 +6,7 @@ Training images for the network: random views, mosaics, colours and pasted objec
 """
 
 import string
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -285,26 +285,40 @@ _PASTED = 0.3  # fraction of images that get pasted objects
 _MAX_PASTED = 3  # objects in an image
 _RARE = 0.5  # a class with fewer objects than this fraction of the mean is rare
 _MARGIN = 0.2  # surroundings of a pasted object on each side, fraction of the box
-_MIN_DONOR = 24.0  # longer side of an object to paste, pixels
+_MIN_PASTED_SIDE = 24.0  # longer side of an object to paste, or to paste in front of, pixels
 _PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the image's height
 _MAX_COVERED = 0.45  # maximum fraction of another object that a pasted one hides
-_MAX_ENLARGED = 1.5  # of the pixels of a pasted object
+_MAX_ENLARGEMENT = 1.5  # maximum scale of a pasted object
 _OCCLUDED = 0.4  # fraction of images in which an object is pasted in front of another one
-_FRONT_CLASSES = 3  # an object in front is one of the first classes: car, truck, bus
+_IN_FRONT = "car", "truck", "bus"
 _FRONT_SIDES = 0.9, 1.4  # its longer side, as a multiple of that of the object behind it
 _FRONT_MARGIN = 0.06  # its surroundings: few, as they cover the object behind it
 _OVERLAP = 0.2, 0.6  # width that it covers, fraction of that of the narrower object
-_LOWER = 0.3  # how much lower it may be, as it is nearer, fraction of its height
-_MAX_OCCLUDED = 0.75  # maximum fraction of another object that it covers
+_LOWER = 0.3  # maximum distance of its lower edge below that of the other, fraction of its height
 _SIGNS = 0.3  # fraction of images that get signs
 _MAX_SIGNS = 3  # signs in an image
 
 
-SampleObject = tuple[NetSample, int]
-"""A sample, and the row of an object in it."""
+@dataclass(frozen=True, slots=True, eq=False)
+class SampleObject:
+    """An object of a sample: that in a row of its boxes."""
+
+    sample: NetSample
+    row: int
+
+    @property
+    def box(self) -> Float32Array:
+        """x1, y1, x2, y2, `(4,)`, pixels of the sample."""
+        return self.sample.boxes[self.row]
+
+    @property
+    def sides(self) -> Float32Array:
+        """Width and height, `(2,)`, pixels of the sample."""
+        return self.box[2:] - self.box[:2]
+
 
 Objects = Sequence[Sequence[SampleObject]]
-"""The objects of each class."""
+"""Objects by class."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,8 +354,10 @@ class SampleDrawer:
         chances /= chances.sum()
         chances *= repeat_factors(self._samples, chances, REPEAT_THRESHOLD)
         self._chances = chances / chances.sum()
-        self._objects = whole_objects(self._samples)
-        self._rare = rare_objects(self._objects)
+        objects = whole_objects(self._samples)
+        self._rare = rare_objects(objects)
+        classes = enumerate(settings.classes)
+        self._fronts = [objects[n] for n, name in classes if name in _IN_FRONT and n in objects]
 
     def draw(self, rng: np.random.Generator, drawing: ImageDrawing) -> NetSample:
         """Return one training image with the vehicles in it."""
@@ -355,7 +371,7 @@ class SampleDrawer:
             sample = _random_view(rng, self._pick(rng), size, scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        sample = with_occlusion(rng, with_rare_objects(rng, sample, self._rare), self._objects)
+        sample = with_occlusion(rng, with_rare_objects(rng, sample, self._rare), self._fronts)
         sample = with_signs(rng, sample)
         sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
         may_have_lamps = ~sample.ignored & (sides[:, 0] > 0.45 * sides[:, 1])  # people have none
@@ -407,19 +423,19 @@ def repeat_factors(
     return np.asarray(factors.max(axis=1).clip(1.0), np.float64)
 
 
-def whole_objects(samples: Sequence[NetSample]) -> Objects:
-    """Return the objects that can be pasted into images."""
+def whole_objects(samples: Sequence[NetSample]) -> dict[int, list[SampleObject]]:
+    """Return the objects of each class that are large, inside the image, and not hidden."""
     objects: dict[int, list[SampleObject]] = {}
     for sample in samples:
         for row in _whole(sample):
-            objects.setdefault(int(sample.classes[row]), []).append((sample, row))
-    return [of_class for _, of_class in sorted(objects.items())]
+            objects.setdefault(int(sample.classes[row]), []).append(SampleObject(sample, row))
+    return dict(sorted(objects.items()))
 
 
-def rare_objects(objects: Objects) -> Objects:
-    """Return those of the classes that have few."""
-    limit = _RARE * sum(map(len, objects)) / max(1, len(objects))
-    return [of_class for of_class in objects if len(of_class) < limit]
+def rare_objects(objects: Mapping[int, Sequence[SampleObject]]) -> Objects:
+    """Return the objects of the rare classes."""
+    limit = _RARE * sum(map(len, objects.values())) / max(1, len(objects))
+    return [of_class for of_class in objects.values() if len(of_class) < limit]
 
 
 def with_rare_objects(rng: np.random.Generator, sample: NetSample, rare: Objects) -> NetSample:
@@ -429,37 +445,38 @@ def with_rare_objects(rng: np.random.Generator, sample: NetSample, rare: Objects
     """
     if not rare or rng.random() >= _PASTED:
         return sample
-    sample = replace(sample, image=sample.image.copy())
     for _ in range(int(rng.integers(1, _MAX_PASTED + 1))):
-        of_class = rare[int(rng.integers(len(rare)))]
-        sample = _paste(rng, sample, of_class[int(rng.integers(len(of_class)))])
+        sample = _paste(rng, sample, _one_of(rng, rare))
     return sample
 
 
-def with_occlusion(rng: np.random.Generator, sample: NetSample, objects: Objects) -> NetSample:
-    """Sometimes paste an object of the first classes in front of a part of another object.
+def with_occlusion(rng: np.random.Generator, sample: NetSample, fronts: Objects) -> NetSample:
+    """Sometimes paste one of the objects in front of a part of an object of the sample.
 
-    Without such images, of two vehicles that stand one behind the other often one is found.
+    Without such images, the network often finds only one of two vehicles, one in front of the
+    other.
     """
     sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
-    rows = np.flatnonzero(~sample.ignored & (sides.max(axis=1, initial=0) >= _MIN_DONOR))
-    if not objects or rng.random() >= _OCCLUDED or not len(rows):
+    rows = np.flatnonzero(~sample.ignored & (sides.max(axis=1, initial=0) >= _MIN_PASTED_SIDE))
+    if not fronts or rng.random() >= _OCCLUDED or not len(rows):
         return sample
     row = int(rng.choice(rows))
-    of_class = objects[int(rng.integers(min(_FRONT_CLASSES, len(objects))))]
-    item = of_class[int(rng.integers(len(of_class)))]
-    item_sides = item[0].boxes[item[1], 2:] - item[0].boxes[item[1], :2]
-    factor = float(sides[row].max() / item_sides.max()) * _scale(rng, _FRONT_SIDES)
-    if factor > _MAX_ENLARGED:
+    front = _one_of(rng, fronts)
+    factor = float(sides[row].max() / front.sides.max()) * _scale(rng, _FRONT_SIDES)
+    if factor > _MAX_ENLARGEMENT:
         return sample
-    width, height = factor * item_sides
+    width, height = factor * front.sides
     x1, _, x2, y2 = sample.boxes[row]
     hidden = rng.uniform(*_OVERLAP) * min(width, x2 - x1)
     x = x2 - hidden if rng.random() < 0.5 else x1 + hidden - width
     y = y2 + rng.uniform(0, _LOWER) * height - height  # nearer, and so lower
-    sample = replace(sample, image=sample.image.copy())
-    limits = _PasteLimits(margin=_FRONT_MARGIN, covered=_MAX_OCCLUDED)
-    return _placed(sample, item, factor, (x, y), limits)
+    box = Box.sized(x, y, width, height)
+    return _pasted(sample, front, box, margin=_FRONT_MARGIN, max_covered=1 - _MIN_VISIBLE)
+
+
+def _one_of(rng: np.random.Generator, objects: Objects) -> SampleObject:
+    of_class = objects[int(rng.integers(len(objects)))]
+    return of_class[int(rng.integers(len(of_class)))]
 
 
 def _whole(sample: NetSample) -> list[int]:
@@ -468,7 +485,7 @@ def _whole(sample: NetSample) -> list[int]:
     boxes, has_class = sample.boxes.astype(np.float64), sample.classes >= 0
     overlaps = iou_matrix(boxes, boxes) - np.eye(len(boxes))
     overlaps[:, sample.ignored & has_class] = 0  # the whole image
-    large = (boxes[:, 2:] - boxes[:, :2]).max(1, initial=0) >= _MIN_DONOR
+    large = (boxes[:, 2:] - boxes[:, :2]).max(1, initial=0) >= _MIN_PASTED_SIDE
     inside = (boxes > 1).all(1) & (boxes[:, 2:] < np.array([width, height]) - 1).all(1)
     apart = overlaps.max(1, initial=0) < 0.1
     is_whole = large & inside & apart & has_class & ~sample.ignored
@@ -478,66 +495,55 @@ def _whole(sample: NetSample) -> list[int]:
 def _paste(rng: np.random.Generator, sample: NetSample, item: SampleObject) -> NetSample:
     """Paste one object into the image of a sample, unless it would cover others."""
     height, width = sample.image.shape[:2]
-    donor, row = item
-    sides = donor.boxes[row, 2:] - donor.boxes[row, :2]
-    longer = float(sides.max())
-    largest = max(_PASTED_SIDES[0], min(_PASTED_SIDES[1] * height, _MAX_ENLARGED * longer))
-    factor = _scale(rng, (_PASTED_SIDES[0], largest)) / longer
-    wide, tall = (1 + 2 * _MARGIN) * factor * sides
+    longer = float(item.sides.max())
+    largest = max(_PASTED_SIDES[0], min(_PASTED_SIDES[1] * height, _MAX_ENLARGEMENT * longer))
+    sides = item.sides * _scale(rng, (_PASTED_SIDES[0], largest)) / longer
+    wide, tall = (1 + 2 * _MARGIN) * sides
     free = height - tall - height // 4  # never near the top, where the sky is
     if free <= 0 or wide >= width:
         return sample
-    x = rng.uniform(0, width - wide) + _MARGIN * factor * sides[0]
-    y = height // 4 + rng.uniform(0, free) + _MARGIN * factor * sides[1]
-    limits = _PasteLimits(margin=_MARGIN, covered=_MAX_COVERED)
-    return _placed(sample, item, factor, (x, y), limits)
+    x = rng.uniform(0, width - wide) + _MARGIN * sides[0]
+    y = height // 4 + rng.uniform(0, free) + _MARGIN * sides[1]
+    box = Box.sized(x, y, *sides)
+    return _pasted(sample, item, box, margin=_MARGIN, max_covered=_MAX_COVERED)
 
 
-@dataclass(frozen=True, slots=True)
-class _PasteLimits:
-    """The margin around a pasted object, and how much of another it may cover, fractions."""
-
-    margin: float
-    covered: float
-
-
-def _placed(
-    sample: NetSample,
-    item: SampleObject,
-    factor: float,
-    corner: tuple[float, float],
-    limits: _PasteLimits,
+def _pasted(
+    sample: NetSample, item: SampleObject, box: Box, *, margin: float, max_covered: float
 ) -> NetSample:
-    """Paste an object, scaled by `factor`, with its upper left corner at a point of a sample.
+    """Return the sample with an object, scaled into a box.
 
-    The sample stays as it is where the object would reach out of the image or cover too much.
+    The sample stays as it is where the object would reach out of the image, or cover more of
+    another one than the fraction `max_covered`. `margin` is the width of its surroundings, a
+    fraction of its sides.
     """
-    donor, row = item
-    box, ends = donor.boxes[row], np.array(donor.image.shape[1::-1] * 2)
-    margin = limits.margin * np.tile(box[2:] - box[:2], 2) * (-1, -1, 1, 1)
-    left, top, right, bottom = np.clip(box + margin, 0, ends).round().astype(int).tolist()
+    source = item.sample.image
+    around = item.box + margin * np.tile(item.sides, 2) * (-1, -1, 1, 1)
+    limits = np.array(source.shape[1::-1] * 2)
+    left, top, right, bottom = np.clip(around, 0, limits).round().astype(int).tolist()
+    factor = box.width / float(item.sides[0])
     method = cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR
-    patch = cv2.resize(
-        donor.image[top:bottom, left:right], None, fx=factor, fy=factor, interpolation=method
-    )
+    part = source[top:bottom, left:right]
+    patch = cv2.resize(part, None, fx=factor, fy=factor, interpolation=method)
     rows, columns = patch.shape[:2]
-    inner = (box - np.array([left, top] * 2)) * factor
-    x, y = round(corner[0] - inner[0]), round(corner[1] - inner[1])
+    inner = (item.box - np.array([left, top] * 2)) * factor
+    x, y = round(box.x1 - inner[0]), round(box.y1 - inner[1])
     height, width = sample.image.shape[:2]
     if x < 0 or y < 0 or x + columns > width or y + rows > height:
         return sample
     pasted_box = (inner + np.array([x, y] * 2)).astype(np.float32)[np.newaxis]
     objects = sample.boxes[~sample.ignored].astype(np.float64)
-    if coverage(objects, pasted_box.astype(np.float64)).max(initial=0) > limits.covered:
+    if coverage(objects, pasted_box.astype(np.float64)).max(initial=0) > max_covered:
         return sample
-    part = sample.image[y : y + rows, x : x + columns]
+    image = sample.image.copy()
+    under = image[y : y + rows, x : x + columns]
     opacity = _feather(columns, inner[0], inner[2]) * _feather(rows, inner[1], inner[3])[:, None]
-    part[:] = blended(part, _image(patch), opacity)
-    return replace(
-        sample,
-        boxes=np.concatenate([sample.boxes, pasted_box]),
-        classes=np.append(sample.classes, donor.classes[row]),
-        ignored=np.append(sample.ignored, False),
+    under[:] = blended(under, _image(patch), opacity)
+    return NetSample(
+        image,
+        np.concatenate([sample.boxes, pasted_box]),
+        np.append(sample.classes, item.sample.classes[item.row]),
+        np.append(sample.ignored, False),
     )
 
 
