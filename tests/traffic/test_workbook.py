@@ -153,7 +153,7 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
     empty = " -" * 13
     line = "east: this line is shorter than a vehicle; make it longer [line]"
     texts = (*wrap(f"{line}; the image is dark [dark]", 80), *wrap(HEAVY_NAMED, 80))
-    doubt, other, heavy, right = (text.replace(" ", "_") for text in texts)
+    doubt, other, heavy = (text.replace(" ", "_") for text in texts)
     facts = f"""
         {FORMULA} - {empty}
         surveyor A._Smith {empty}
@@ -169,7 +169,6 @@ def test_the_summary_says_what_was_counted_when_and_how_right(book: Path) -> Non
         conditions {doubt} {empty}
         - {other} {empty}
         heavy_share {heavy} {empty}
-        - {right} {empty}
         program vdet_{__version__} {empty}
         - - {empty}
         Checks - {empty}
