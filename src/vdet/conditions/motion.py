@@ -154,7 +154,7 @@ class MotionWatch:
     def __init__(self, lines: Mapping[str, Segment]) -> None:
         self._lines = lines
         self._missed = self._others = self._tracked = self._travelled = 0
-        self._farthest = 0.0
+        self._farthest = 0.0  # fraction of the width
         self._crossed: Counter[str] = Counter()
         self._spans: list[Span] = []
         self._movers: list[Mover] = []
@@ -221,7 +221,7 @@ class MotionWatch:
 
     def _nothing_found(self) -> list[Finding]:
         """Return the finding about a video without a single track."""
-        if self._missed >= _MIN_MOVERS or self._farthest >= _FAR * self._covered.shape[1]:
+        if self._missed >= _MIN_MOVERS or self._farthest >= _FAR:
             places = "".join(f", {number} across {name}" for name, number in self._crossed.items())
             text = (
                 f"no vehicle was found, but at least {quantity(self._missed, 'thing')} moved here"
@@ -263,13 +263,14 @@ class MotionWatch:
 
     def _end(self, movers: Iterable[Mover]) -> None:
         """Count the movers that travelled and were not detected."""
+        width = self._covered.shape[1]
         for mover in movers:
-            if not mover.is_detected and mover.has_travelled(self._covered.shape[1]):
+            if not mover.is_detected and mover.has_travelled(width):
                 if not mover.is_vehicle:
                     self._others += 1
                     continue
                 self._missed += 1
-                self._farthest = max(self._farthest, mover.distance)
+                self._farthest = max(self._farthest, mover.distance / width)
                 self._crossed.update(mover.crossed)
                 end = max([mover.last, *(last for _, last in self._spans[-1:])])
                 extend(self._spans, mover.first, GAP)

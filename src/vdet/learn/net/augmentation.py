@@ -290,7 +290,7 @@ _PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of t
 _MAX_COVERED = 0.45  # maximum fraction of another object that a pasted one hides
 _MAX_ENLARGEMENT = 1.5  # maximum scale of a pasted object
 _OCCLUDED = 0.4  # fraction of images in which an object is pasted in front of another one
-_IN_FRONT = "car", "truck", "bus"
+_IN_FRONT = "car", "truck", "bus"  # classes of such objects
 _FRONT_SIDES = 0.9, 1.4  # its longer side, as a multiple of that of the object behind it
 _FRONT_MARGIN = 0.06  # its surroundings: few, as they cover the object behind it
 _OVERLAP = 0.2, 0.6  # width that it covers, fraction of that of the narrower object
@@ -446,7 +446,7 @@ def with_rare_objects(rng: np.random.Generator, sample: NetSample, rare: Objects
     if not rare or rng.random() >= _PASTED:
         return sample
     for _ in range(int(rng.integers(1, _MAX_PASTED + 1))):
-        sample = _paste(rng, sample, _one_of(rng, rare))
+        sample = _pasted_anywhere(rng, sample, _one_of(rng, rare))
     return sample
 
 
@@ -492,8 +492,8 @@ def _whole(sample: NetSample) -> list[int]:
     return [int(row) for row in np.flatnonzero(is_whole)]
 
 
-def _paste(rng: np.random.Generator, sample: NetSample, item: SampleObject) -> NetSample:
-    """Paste one object into the image of a sample, unless it would cover others."""
+def _pasted_anywhere(rng: np.random.Generator, sample: NetSample, item: SampleObject) -> NetSample:
+    """Return the sample with an object of random size at a random position: see `_pasted`."""
     height, width = sample.image.shape[:2]
     longer = float(item.sides.max())
     largest = max(_PASTED_SIDES[0], min(_PASTED_SIDES[1] * height, _MAX_ENLARGEMENT * longer))
